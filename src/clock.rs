@@ -1,0 +1,111 @@
+//! One time for everything that gets wet and dries.
+//!
+//! [`WeatheringClock`] counts ticks. Seconds are derived from the count, never summed, so that a run of an hour
+//! is as exact as its first second and a replay lands on the same bits whatever its frame rate was.
+
+use bevy::prelude::*;
+
+/// Counts fixed ticks and tells their length. Advanced once per tick, before [`WeatheringSystems::First`].
+///
+/// The rate is a whole number of ticks per second, so that everything derived from it can be exact.
+///
+/// [`WeatheringSystems::First`]: crate::schedule::WeatheringSystems::First
+#[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+#[reflect(Resource)]
+pub struct WeatheringClock {
+    tick: u32,
+    hz: u32,
+}
+
+impl Default for WeatheringClock {
+    fn default() -> Self {
+        Self::new(Self::DEFAULT_HZ)
+    }
+}
+
+impl WeatheringClock {
+    /// Ticks per second unless told otherwise.
+    pub const DEFAULT_HZ: u32 = 60;
+    /// The highest tick rate that makes sense: a millisecond a tick.
+    pub const MAX_HZ: u32 = 1000;
+
+    /// A clock at tick 0; `hz` is clamped to 1..=[`Self::MAX_HZ`].
+    pub fn new(hz: u32) -> Self {
+        Self { tick: 0, hz: hz.clamp(1, Self::MAX_HZ) }
+    }
+
+    /// Ticks since the start; the first tick that runs sees 1.
+    pub fn tick(&self) -> u32 {
+        self.tick
+    }
+
+    /// Ticks per second.
+    pub fn hz(&self) -> u32 {
+        self.hz
+    }
+
+    /// Length of a tick in seconds.
+    pub fn delta_secs(&self) -> f32 {
+        1.0 / self.hz as f32
+    }
+
+    /// Weather time in seconds since the start.
+    pub fn seconds(&self) -> f64 {
+        f64::from(self.tick) / f64::from(self.hz)
+    }
+
+    /// Back to tick 0.
+    pub fn reset(&mut self) {
+        self.tick = 0;
+    }
+
+    /// One tick on.
+    pub fn advance(&mut self) {
+        self.tick += 1;
+    }
+}
+
+/// Adds [`WeatheringClock`] and runs `FixedUpdate` at its rate.
+pub struct ClockPlugin {
+    /// Ticks per second, 1..=[`WeatheringClock::MAX_HZ`].
+    pub hz: u32,
+}
+
+impl Default for ClockPlugin {
+    fn default() -> Self {
+        Self { hz: WeatheringClock::DEFAULT_HZ }
+    }
+}
+
+impl Plugin for ClockPlugin {
+    fn build(&self, app: &mut App) {
+        let clock = WeatheringClock::new(self.hz);
+        app.insert_resource(Time::<Fixed>::from_hz(f64::from(clock.hz())))
+            .insert_resource(clock)
+            .add_systems(FixedFirst, advance_clock);
+    }
+}
+
+fn advance_clock(mut clock: ResMut<WeatheringClock>) {
+    clock.advance();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seconds_do_not_drift() {
+        let mut clock = WeatheringClock::new(60);
+        for _ in 0..216_000 {
+            clock.advance();
+        }
+        assert_eq!(clock.seconds(), 3600.0);
+    }
+
+    #[test]
+    fn rates_out_of_range_are_clamped() {
+        assert_eq!(WeatheringClock::new(0).hz(), 1);
+        assert_eq!(WeatheringClock::new(u32::MAX).hz(), WeatheringClock::MAX_HZ);
+    }
+}

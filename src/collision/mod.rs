@@ -1,0 +1,87 @@
+//! Particles against meshes: swept segments, closest hits, exact uv.
+//!
+//! Each mesh asset gets one BVH ([`MeshBvh`]), built off the main thread and shared by all entities that show the
+//! mesh. The [`CollisionScene`] holds those entities with their transforms under a BVH of their own. A particle
+//! casts the segment it moved in this tick: through the upper BVH in world space, then in the space of each mesh
+//! on the way, where the distance is a fraction of the same segment, so that any invertible transform will do.
+//! The closest hit, seen from either side, becomes an [`Impact`] with the uv of the point.
+//!
+//! The loop is parallel over particles. Threads write to their own buffers; one sort by [`Sequence`] merges them,
+//! so the order of [`Impacts`] does not depend on the number of threads.
+//!
+//! Not here: skinned and morphed meshes (they are hit where their bind pose is).
+//!
+//! [`Sequence`]: crate::particle::Sequence
+
+mod bvh;
+mod colliders;
+mod scene;
+mod trace;
+mod triangles;
+
+use bevy::prelude::*;
+
+use crate::effect::EffectIndex;
+use crate::particle::{RetireParticles, Sequence};
+use crate::schedule::WeatheringSystems;
+
+pub use bvh::{LocalHit, MeshBvh};
+pub use colliders::{ColliderReport, MeshColliders, NotWeatherable, SurfaceCollider};
+pub use scene::{CollisionScene, SceneHit};
+pub use trace::{ReportImpacts, SurfaceImpact, trace_particles};
+pub use triangles::{MeshTriangles, TriangleError, TriangleReport};
+
+/// A particle that hit a surface in this tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Impact {
+    /// Number of the particle.
+    pub sequence: Sequence,
+    /// The entity that was hit.
+    pub surface: Entity,
+    /// Triangle of the surface's mesh, in the mesh's order.
+    pub triangle: u32,
+    /// World space, metres.
+    pub point: Vec3,
+    /// Unit normal of the triangle on the side that was hit; world space.
+    pub normal: Vec3,
+    /// Texture coordinates of the point, as the mesh has them (any tile).
+    pub uv: Vec2,
+    /// Change of u and v for one metre on the surface along their own directions. 0 where uv does not vary.
+    pub uv_per_metre: Vec2,
+    /// Velocity at the impact, m/s.
+    pub velocity: Vec3,
+    /// What hit.
+    pub effect: EffectIndex,
+    /// Water carried, nanolitres.
+    pub volume_nl: u32,
+}
+
+/// The impacts of this tick, in the order of [`Impact::sequence`].
+#[derive(Resource, Debug, Default)]
+pub struct Impacts(pub Vec<Impact>);
+
+/// Builds colliders and traces particles.
+pub struct CollisionPlugin;
+
+impl Plugin for CollisionPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<MeshColliders>()
+            .init_resource::<CollisionScene>()
+            .init_resource::<Impacts>()
+            .add_message::<SurfaceImpact>()
+            .register_type::<ReportImpacts>()
+            .add_systems(
+                PreUpdate,
+                (colliders::forget_changed_meshes, colliders::build_colliders, colliders::attach_colliders)
+                    .chain(),
+            )
+            .add_systems(
+                FixedUpdate,
+                (scene::update_collision_scene, trace_particles, trace::report_impacts)
+                    .chain()
+                    .in_set(WeatheringSystems::Trace)
+                    // The dead are despawned when nobody needs them any more.
+                    .before(RetireParticles),
+            );
+    }
+}

@@ -1,0 +1,175 @@
+//! All surfaces with their transforms, under one BVH.
+
+use std::sync::Arc;
+
+use bevy::math::Affine3A;
+use bevy::prelude::*;
+
+use super::bvh::{BoxBvh, Segment};
+use super::{LocalHit, MeshBvh, SurfaceCollider};
+
+/// Every surface that can be hit, where it is now.
+#[derive(Resource, Default)]
+pub struct CollisionScene {
+    instances: Vec<Instance>,
+    top: BoxBvh,
+    bounds: (Vec3, Vec3),
+}
+
+struct Instance {
+    surface: Entity,
+    world_from_mesh: Affine3A,
+    mesh_from_world: Affine3A,
+    bvh: Arc<MeshBvh>,
+}
+
+/// The closest hit of a segment in the scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SceneHit {
+    /// The surface.
+    pub surface: Entity,
+    /// 0 at the start of the segment, 1 at its end.
+    pub fraction: f32,
+    /// Triangle of the surface's mesh, in the mesh's order.
+    pub triangle: u32,
+    /// World space, metres.
+    pub point: Vec3,
+    /// Unit normal of the triangle on the side the segment came from; world space.
+    pub normal: Vec3,
+    /// Texture coordinates of the point.
+    pub uv: Vec2,
+    /// Change of u and v for one metre on the surface along their own directions. 0 where uv does not vary.
+    pub uv_per_metre: Vec2,
+}
+
+impl CollisionScene {
+    /// A scene of these surfaces. Order matters for nothing but ties. What cannot be inverted (a scale of 0) or is
+    /// not finite is left out.
+    pub fn new(surfaces: impl IntoIterator<Item = (Entity, Affine3A, Arc<MeshBvh>)>) -> Self {
+        let instances: Vec<Instance> = surfaces
+            .into_iter()
+            .filter(|(_, world_from_mesh, _)| {
+                let volume = world_from_mesh.matrix3.determinant();
+                world_from_mesh.is_finite() && volume.is_finite() && volume != 0.0
+            })
+            .map(|(surface, world_from_mesh, bvh)| Instance {
+                surface,
+                world_from_mesh,
+                mesh_from_world: world_from_mesh.inverse(),
+                bvh,
+            })
+            .collect();
+        let boxes: Vec<(Vec3, Vec3)> = instances.iter().map(Instance::bounds).collect();
+        let top = BoxBvh::build(&boxes);
+        let bounds = top.bounds();
+        Self { instances, top, bounds }
+    }
+
+    /// Number of surfaces.
+    pub fn len(&self) -> usize {
+        self.instances.len()
+    }
+
+    /// Whether there is nothing to hit.
+    pub fn is_empty(&self) -> bool {
+        self.instances.is_empty()
+    }
+
+    /// The closest hit on the segment from `start` to `end`, seen from either side.
+    #[inline]
+    pub fn cast(&self, start: Vec3, end: Vec3) -> Option<SceneHit> {
+        // Most particles are in the air: this is all they cost.
+        if !segment_near_box(start, end, self.bounds) {
+            return None;
+        }
+        self.cast_near(start, end)
+    }
+
+    fn cast_near(&self, start: Vec3, end: Vec3) -> Option<SceneHit> {
+        let mut closest: Option<(usize, LocalHit)> = None;
+        self.top.visit(Segment::new(start, end)?, |index, fraction| {
+            let instance = &self.instances[index as usize];
+            let to_mesh = |point| instance.mesh_from_world.transform_point3(point);
+            let hit = instance.bvh.cast_within(Segment::new(to_mesh(start), to_mesh(end))?, fraction)?;
+            closest = Some((index as usize, hit));
+            Some(hit.fraction)
+        });
+        let (index, hit) = closest?;
+        Some(self.instances[index].resolve(start, end, hit))
+    }
+}
+
+impl Instance {
+    /// Box around the eight corners of the mesh's box, in world space.
+    fn bounds(&self) -> (Vec3, Vec3) {
+        let (min, max) = self.bvh.bounds();
+        let corner = |i: u32| {
+            let pick = |axis: u32, low: f32, high: f32| if i >> axis & 1 == 0 { low } else { high };
+            let corner = Vec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z));
+            self.world_from_mesh.transform_point3(corner)
+        };
+        (0..8).map(corner).fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), corner| {
+            (low.min(corner), high.max(corner))
+        })
+    }
+
+    /// Point, normal and uv of a hit.
+    fn resolve(&self, start: Vec3, end: Vec3, hit: LocalHit) -> SceneHit {
+        let triangles = self.bvh.triangles();
+        let index = hit.triangle as usize;
+        let [a, b, c] =
+            triangles.positions[index].map(|corner| self.world_from_mesh.transform_point3(corner));
+        let [uv_a, uv_b, uv_c] = triangles.uvs[index];
+        let point = start.lerp(end, hit.fraction);
+        let (ab, ac) = (b - a, c - a);
+        let cross = ab.cross(ac);
+        let twice_area_squared = cross.length_squared();
+        // Barycentric coordinates as ratios of areas; clamped, since the point is only as good as its fraction.
+        let weight_b = (point - a).cross(ac).dot(cross) / twice_area_squared;
+        let weight_c = ab.cross(point - a).dot(cross) / twice_area_squared;
+        let (weight_b, weight_c) = (weight_b.clamp(0.0, 1.0), weight_c.clamp(0.0, 1.0));
+        let facing = cross.normalize_or(Vec3::Y);
+        SceneHit {
+            surface: self.surface,
+            fraction: hit.fraction,
+            triangle: triangles.source[index],
+            point,
+            normal: if facing.dot(end - start) > 0.0 { -facing } else { facing },
+            uv: uv_a + (uv_b - uv_a) * weight_b + (uv_c - uv_a) * weight_c,
+            uv_per_metre: uv_per_metre([ab, ac], [uv_b - uv_a, uv_c - uv_a]),
+        }
+    }
+}
+
+/// How fast u and v change along a triangle with these two edges, in space and in uv: 1/|dP/du|, 1/|dP/dv|.
+fn uv_per_metre([ab, ac]: [Vec3; 2], [uv_ab, uv_ac]: [Vec2; 2]) -> Vec2 {
+    let area = uv_ab.perp_dot(uv_ac);
+    let along_u = (ab * uv_ac.y - ac * uv_ab.y).length();
+    let along_v = (ac * uv_ab.x - ab * uv_ac.x).length();
+    let ratio = |length: f32| if length > 0.0 { (area / length).abs() } else { 0.0 };
+    Vec2::new(ratio(along_u), ratio(along_v))
+}
+
+/// Whether the box around the segment touches the box. Never false for a segment that does.
+#[inline]
+fn segment_near_box(start: Vec3, end: Vec3, (min, max): (Vec3, Vec3)) -> bool {
+    (start.min(end).cmple(max) & start.max(end).cmpge(min)).all()
+}
+
+/// Follows surfaces that appear, move or go. Costs nothing while none does.
+pub(super) fn update_collision_scene(
+    mut scene: ResMut<CollisionScene>,
+    surfaces: Query<(Entity, &GlobalTransform, &SurfaceCollider)>,
+    changed: Query<(), (With<SurfaceCollider>, Or<(Changed<GlobalTransform>, Changed<SurfaceCollider>)>)>,
+    mut removed: RemovedComponents<SurfaceCollider>,
+) {
+    if removed.read().count() == 0 && changed.is_empty() {
+        return;
+    }
+    let mut surfaces: Vec<_> = surfaces
+        .iter()
+        .map(|(entity, transform, collider)| (entity, transform.affine(), collider.0.clone()))
+        .collect();
+    surfaces.sort_unstable_by_key(|(entity, ..)| *entity);
+    *scene = CollisionScene::new(surfaces);
+}

@@ -1,0 +1,134 @@
+//! Reads `*.effect.ron` and refuses what makes no sense, by field name.
+
+use bevy::asset::{AssetLoader, LoadContext, io::Reader};
+use bevy::prelude::*;
+
+use super::{Paint, WeatherEffect};
+
+/// Loads a [`WeatherEffect`] from RON.
+#[derive(Default, TypePath)]
+pub struct WeatherEffectLoader;
+
+/// Why an effect was refused.
+#[derive(thiserror::Error, Debug)]
+#[non_exhaustive]
+pub enum EffectError {
+    /// The file could not be read.
+    #[error("cannot read the effect: {0}")]
+    Io(#[from] std::io::Error),
+    /// The file is not RON of the right shape.
+    #[error("{0}")]
+    Ron(#[from] ron::error::SpannedError),
+    /// A number is not finite or out of range.
+    #[error("field `{field}` is {value}, but must be {expected}")]
+    Value {
+        /// Path of the field inside the effect.
+        field: &'static str,
+        /// What it was.
+        value: f32,
+        /// What it must be.
+        expected: &'static str,
+    },
+}
+
+impl AssetLoader for WeatherEffectLoader {
+    type Asset = WeatherEffect;
+    type Settings = ();
+    type Error = EffectError;
+
+    async fn load(
+        &self,
+        reader: &mut dyn Reader,
+        _settings: &(),
+        _context: &mut LoadContext<'_>,
+    ) -> Result<WeatherEffect, EffectError> {
+        let mut bytes = Vec::new();
+        reader.read_to_end(&mut bytes).await?;
+        WeatherEffect::from_ron(&bytes)
+    }
+
+    fn extensions(&self) -> &[&str] {
+        &["effect.ron"]
+    }
+}
+
+impl WeatherEffect {
+    /// Parses and validates an effect.
+    ///
+    /// # Errors
+    /// [`EffectError`] names the line or the field.
+    pub fn from_ron(bytes: &[u8]) -> Result<Self, EffectError> {
+        let effect: Self = ron::de::from_bytes(bytes)?;
+        effect.validate()?;
+        Ok(effect)
+    }
+
+    /// Checks every number against the range its field documents.
+    ///
+    /// # Errors
+    /// [`EffectError::Value`] for the first field out of range.
+    pub fn validate(&self) -> Result<(), EffectError> {
+        let zero_to = |field, value: f32, max: f32, expected| within(field, value, 0.0, max, expected);
+        zero_to("water_mm3", self.water_mm3, Self::MAX_VOLUME_MM3, "0 to 1000000 (a litre)")?;
+        zero_to("terminal_speed", self.terminal_speed, 1000.0, "0 to 1000 m/s")?;
+        within("gravity_scale", self.gravity_scale, -10.0, 10.0, "-10 to 10")?;
+        within("stamp_radius", self.stamp_radius, 1.0e-6, 100.0, "0.000001 to 100 m")?;
+        zero_to("stamp_radius_jitter", self.stamp_radius_jitter, 0.9, "0 to 0.9")?;
+        self.diffuse.validate("diffuse.color", "diffuse.opacity")?;
+        self.specular.validate("specular.color", "specular.opacity")?;
+        within("bump", self.bump, -1.0, 1.0, "-1 to 1")?;
+        for channel in self.look.color {
+            zero_to("look.color", channel, 1.0, "0 to 1")?;
+        }
+        zero_to("look.width", self.look.width, 10.0, "0 to 10 m")?;
+        zero_to("look.exposure", self.look.exposure, 10.0, "0 to 10 s")
+    }
+}
+
+impl Paint {
+    fn validate(&self, color: &'static str, opacity: &'static str) -> Result<(), EffectError> {
+        for channel in self.color {
+            within(color, channel, 0.0, 1.0, "0 to 1")?;
+        }
+        within(opacity, self.opacity, 0.0, 1.0, "0 to 1")
+    }
+}
+
+fn within(
+    field: &'static str,
+    value: f32,
+    min: f32,
+    max: f32,
+    expected: &'static str,
+) -> Result<(), EffectError> {
+    // Written so that NaN fails.
+    if value >= min && value <= max { Ok(()) } else { Err(EffectError::Value { field, value, expected }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_is_valid_and_survives_a_round_trip() {
+        let effect = WeatherEffect::default();
+        let text = ron::to_string(&effect).unwrap();
+        assert_eq!(WeatherEffect::from_ron(text.as_bytes()).unwrap(), effect);
+    }
+
+    #[test]
+    fn errors_name_the_field() {
+        for (text, field) in [
+            ("(water_mm3: -1.0)", "water_mm3"),
+            ("(water_mm3: NaN)", "water_mm3"),
+            ("(stamp_radius: 0.0)", "stamp_radius"),
+            ("(diffuse: (opacity: 2.0))", "diffuse.opacity"),
+            ("(bump: inf)", "bump"),
+        ] {
+            let error = WeatherEffect::from_ron(text.as_bytes()).unwrap_err().to_string();
+            assert!(error.contains(field), "{text}: {error}");
+        }
+        let error = WeatherEffect::from_ron(b"(wetness: 1.0)").unwrap_err().to_string();
+        assert!(error.contains("wetness"), "{error}");
+    }
+}

@@ -1,0 +1,237 @@
+//! What each emitter owes in this tick, and paying it in one batch.
+
+use bevy::prelude::*;
+use rand_pcg::Pcg32;
+
+use super::{EmissionSeed, Emitter};
+use crate::clock::WeatheringClock;
+use crate::effect::EffectTable;
+use crate::particle::{
+    Lifespan, ParticleBundle, ParticleConfig, ParticleCounts, Position, Sequence, Velocity, Volume,
+};
+
+/// What an [`Emitter`] has sent out and still owes.
+#[derive(Component, Debug, Clone, Default)]
+pub struct EmitterState {
+    /// Particles owed, times the tick rate: stays exact in `f64` for any `f32` rate.
+    owed: f64,
+    /// Water owed below a whole nanolitre.
+    owed_nl: f64,
+    rng: Option<Pcg32>,
+    /// Particles sent out so far.
+    pub emitted: u64,
+}
+
+impl EmitterState {
+    /// Adds one tick's worth of `rate` and takes out the whole particles. Also returns when within the tick the
+    /// first is born, and the time between two, both in ticks.
+    fn due(&mut self, rate: f32, hz: u32) -> (u32, f64, f64) {
+        let (rate, hz) = (f64::from(rate), f64::from(hz));
+        let before = self.owed;
+        self.owed += rate;
+        let count = (self.owed / hz).floor();
+        // Exact: both are multiples of the last bit of `rate`, far above that of an f64.
+        self.owed -= count * hz;
+        (count as u32, (hz - before) / rate, hz / rate)
+    }
+
+    /// Whole nanolitres of the next particle; what is cut off goes to the one after.
+    fn water_nl(&mut self, water_mm3: f32) -> u32 {
+        self.owed_nl += f64::from(water_mm3) * 1000.0;
+        let whole = self.owed_nl.floor();
+        self.owed_nl -= whole;
+        whole as u32
+    }
+}
+
+/// Particles that [`spawn_particles`] will spawn; a buffer that keeps its capacity. Empty between ticks.
+#[derive(Resource, Debug, Default)]
+pub struct NewParticles {
+    particles: Vec<ParticleBundle>,
+    next_sequence: u32,
+}
+
+impl NewParticles {
+    /// Starts numbering again from 0, for a new run in a world without particles.
+    pub fn restart(&mut self) {
+        self.next_sequence = 0;
+    }
+}
+
+/// Lets every enabled emitter, in the order of their streams, write the particles it owes.
+pub fn emit_particles(
+    clock: Res<WeatheringClock>,
+    seed: Res<EmissionSeed>,
+    config: Res<ParticleConfig>,
+    mut effects: ResMut<EffectTable>,
+    mut counts: ResMut<ParticleCounts>,
+    mut new: ResMut<NewParticles>,
+    mut order: Local<Vec<(u32, Entity)>>,
+    mut emitters: Query<(&Emitter, &mut EmitterState, &GlobalTransform)>,
+    streams: Query<(&Emitter, Entity)>,
+) {
+    order.clear();
+    order.extend(streams.iter().filter(|(e, _)| e.enabled && e.rate > 0.0).map(|(e, id)| (e.stream, id)));
+    order.sort_unstable();
+
+    let NewParticles { particles, next_sequence } = &mut *new;
+    for &(_, entity) in order.iter() {
+        let Ok((emitter, mut state, transform)) = emitters.get_mut(entity) else { continue };
+        let Some(index) = effects.index_of(&emitter.effect) else { continue };
+        let Some(effect) = effects.get(index) else { continue };
+
+        let state = &mut *state;
+        let mut rng = state.rng.take().unwrap_or_else(|| Pcg32::new(seed.0, u64::from(emitter.stream)));
+        let (due, first, interval) = state.due(emitter.rate, clock.hz());
+        let room = u64::from(config.max_alive).saturating_sub(counts.alive + particles.len() as u64);
+        let count = u64::from(due).min(room) as u32;
+        counts.refused += u64::from(due - count);
+        state.emitted += u64::from(count);
+
+        let world_from_emitter = transform.affine();
+        let ticks_left = (emitter.lifetime * clock.hz() as f32).ceil().max(1.0);
+        let ticks_left = ticks_left.min(f32::from(Lifespan::MAX_TICKS)) as u16;
+        for i in 0..count {
+            let (position, velocity) = emitter.sample(&world_from_emitter, &mut rng);
+            let born_at = ((first + f64::from(i) * interval) * 65_536.0).clamp(0.0, 65_535.0) as u16;
+            particles.push((
+                Position(position),
+                Velocity(velocity),
+                Lifespan { ticks_left, born_at },
+                Volume(state.water_nl(effect.water_mm3)),
+                Sequence(*next_sequence),
+                index,
+            ));
+            *next_sequence = next_sequence.wrapping_add(1);
+        }
+        state.rng = Some(rng);
+    }
+}
+
+/// Spawns what [`emit_particles`] wrote, in one batch.
+pub fn spawn_particles(world: &mut World) {
+    // Taken out and put back, so that the buffer survives.
+    let mut particles = std::mem::take(&mut world.resource_mut::<NewParticles>().particles);
+    let count = particles.len() as u64;
+    world.spawn_batch(particles.drain(..));
+    world.resource_mut::<NewParticles>().particles = particles;
+    let mut counts = world.resource_mut::<ParticleCounts>();
+    counts.emitted += count;
+    counts.alive += count;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::WeatherEffect;
+    use crate::emitter::EmitterShape;
+
+    fn world(hz: u32, effect: WeatherEffect) -> World {
+        let mut world = World::new();
+        world.insert_resource(WeatheringClock::new(hz));
+        world.insert_resource(EmissionSeed(7));
+        world.init_resource::<ParticleConfig>();
+        world.init_resource::<ParticleCounts>();
+        world.init_resource::<NewParticles>();
+        let mut table = EffectTable::default();
+        table.insert(Handle::default(), effect);
+        world.insert_resource(table);
+        world
+    }
+
+    fn run(world: &mut World, ticks: u32) {
+        let mut schedule = Schedule::default();
+        schedule.add_systems((emit_particles, spawn_particles).chain());
+        for _ in 0..ticks {
+            schedule.run(world);
+        }
+    }
+
+    fn emitted(world: &World) -> u64 {
+        world.resource::<ParticleCounts>().emitted
+    }
+
+    #[test]
+    fn rates_are_exact_at_any_tick_rate() {
+        for hz in [1, 3, 7, 24, 50, 60, 64, 144, 1000] {
+            for (rate, seconds, expected) in
+                [(1000.0, 10, 10_000), (0.1, 30, 3), (333.25, 4, 1333), (1.0, 7, 7), (12_345.5, 2, 24_691)]
+            {
+                let mut world = world(hz, WeatherEffect::default());
+                world.spawn(Emitter { rate, lifetime: 1000.0, ..default() });
+                run(&mut world, hz * seconds);
+                assert_eq!(emitted(&world), expected, "{rate}/s at {hz} Hz for {seconds} s");
+                let spawned = world.query::<&Sequence>().iter(&world).count() as u64;
+                assert_eq!(spawned, expected);
+            }
+        }
+    }
+
+    #[test]
+    fn births_are_spread_evenly_over_the_tick() {
+        let mut world = world(10, WeatherEffect::default());
+        world.spawn(Emitter { rate: 40.0, ..default() });
+        run(&mut world, 1);
+        let mut parts: Vec<f32> =
+            world.query::<&Lifespan>().iter(&world).map(|life| life.moving_part()).collect();
+        parts.sort_by(f32::total_cmp);
+        for (part, expected) in parts.iter().zip([0.0, 0.25, 0.5, 0.75]) {
+            assert!((part - expected).abs() < 1e-3, "{parts:?}");
+        }
+    }
+
+    #[test]
+    fn water_adds_up_to_the_flow() {
+        let mut world = world(60, WeatherEffect { water_mm3: 4.1887903, ..default() });
+        world.spawn(Emitter { rate: 1000.0, ..default() });
+        run(&mut world, 600);
+        let total: u64 = world.query::<&Volume>().iter(&world).map(|volume| u64::from(volume.0)).sum();
+        let expected = f64::from(4.1887903_f32) * 1000.0 * 10_000.0;
+        assert!((total as f64 - expected).abs() <= 1.0, "{total} vs {expected}");
+    }
+
+    #[test]
+    fn the_cap_holds_and_what_it_refused_is_counted() {
+        let mut world = world(60, WeatherEffect::default());
+        world.insert_resource(ParticleConfig { max_alive: 100 });
+        world.spawn(Emitter { rate: 6000.0, ..default() });
+        world.spawn(Emitter { rate: 6000.0, stream: 1, ..default() });
+        run(&mut world, 3);
+        let counts = world.resource::<ParticleCounts>();
+        assert_eq!((counts.emitted, counts.alive, counts.refused), (100, 100, 500));
+    }
+
+    #[test]
+    fn streams_are_independent_and_repeat() {
+        let run_with = |streams: &[u32]| {
+            let mut world = world(60, WeatherEffect::default());
+            for &stream in streams {
+                let shape = EmitterShape::Box { half_size: Vec3::ONE };
+                world.spawn(Emitter { rate: 60.0, stream, shape, ..default() });
+            }
+            run(&mut world, 5);
+            let mut found: Vec<_> = world
+                .query::<(&Sequence, &Position)>()
+                .iter(&world)
+                .map(|(sequence, position)| (*sequence, position.0.to_array()))
+                .collect();
+            found.sort_by_key(|(sequence, _)| *sequence);
+            found.into_iter().map(|(_, position)| position).collect::<Vec<_>>()
+        };
+        let alone = run_with(&[0]);
+        let both = run_with(&[1, 0]);
+        assert_eq!(alone, run_with(&[0]));
+        assert_eq!(alone, both.iter().copied().step_by(2).collect::<Vec<_>>(), "stream 0 goes first");
+        assert_ne!(alone, run_with(&[1]));
+    }
+
+    #[test]
+    fn an_emitter_without_its_effect_owes_nothing() {
+        let mut world = world(60, WeatherEffect::default());
+        *world.resource_mut::<EffectTable>() = EffectTable::default();
+        let emitter = world.spawn(Emitter::default()).id();
+        run(&mut world, 60);
+        assert_eq!(emitted(&world), 0);
+        assert_eq!(world.get::<EmitterState>(emitter).unwrap().owed, 0.0);
+    }
+}

@@ -1,0 +1,108 @@
+//! Where particles come from.
+//!
+//! An [`Emitter`] sits on an entity with a `Transform` and sends particles along the entity's forward axis
+//! (local -Z). How many it owes is kept as an exact remainder: 1,000/s for 10 s are 10,000 particles at any tick
+//! rate. Within a tick they are born evenly spread, so a jet is a jet and no row of clouds. Each emitter has its
+//! own random stream, seeded by [`EmissionSeed`] and the emitter's number; nothing else draws from it.
+
+mod emit;
+mod shape;
+
+use bevy::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::effect::WeatherEffect;
+use crate::schedule::WeatheringSystems;
+
+pub use emit::{EmitterState, NewParticles, emit_particles, spawn_particles};
+
+/// Sends out particles of one effect. Configuration only; see [`EmitterState`] for what it has done.
+#[derive(Component, Reflect, Debug, Clone)]
+#[reflect(Component)]
+#[require(Transform, EmitterState)]
+pub struct Emitter {
+    /// What it sends out. Nothing is emitted (nor owed) before the asset is loaded.
+    pub effect: Handle<WeatherEffect>,
+    /// Particles per second, 0 or more.
+    pub rate: f32,
+    /// Where on the emitter they start.
+    pub shape: EmitterShape,
+    /// Initial speed in m/s along the emitter's forward axis.
+    pub speed: f32,
+    /// Half-angle in radians of the cone of directions, 0..=π.
+    pub spread: f32,
+    /// Seconds until a particle that hits nothing is removed; at most [`Lifespan::MAX_TICKS`] ticks.
+    ///
+    /// [`Lifespan::MAX_TICKS`]: crate::particle::Lifespan::MAX_TICKS
+    pub lifetime: f32,
+    /// Number of its random stream. Emitters take their turns in this order; give each its own.
+    pub stream: u32,
+    /// Switches it off without losing what it owes.
+    pub enabled: bool,
+}
+
+impl Default for Emitter {
+    fn default() -> Self {
+        Self {
+            effect: Handle::default(),
+            rate: 1000.0,
+            shape: EmitterShape::Point,
+            speed: 5.0,
+            spread: 0.0,
+            lifetime: 5.0,
+            stream: 0,
+            enabled: true,
+        }
+    }
+}
+
+/// Where on an emitter particles start. Lengths in metres, in the emitter's space; forward is -Z.
+#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Default)]
+pub enum EmitterShape {
+    /// All from the origin.
+    #[default]
+    Point,
+    /// A nozzle of this radius. Directions fan out from the axis: straight in the middle, [`Emitter::spread`] at
+    /// the rim. A hose.
+    Cone {
+        /// Radius of the nozzle.
+        radius: f32,
+    },
+    /// Anywhere on a disc across the axis.
+    Disc {
+        /// Its radius.
+        radius: f32,
+    },
+    /// Anywhere in a box.
+    Box {
+        /// Half its size per axis.
+        half_size: Vec3,
+    },
+    /// A horizontal rectangle in world space, whatever the emitter's rotation, from which particles start
+    /// downwards (leaning with [`Emitter::spread`]): rain and snow.
+    Sky {
+        /// Half its size along world X and Z.
+        half_size: Vec2,
+    },
+}
+
+/// Seeds every emitter's random stream. Changing it does not reseed streams already begun.
+#[derive(Resource, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[reflect(Resource)]
+pub struct EmissionSeed(pub u64);
+
+/// Spawns the particles of all [`Emitter`]s.
+pub struct EmitterPlugin;
+
+impl Plugin for EmitterPlugin {
+    fn build(&self, app: &mut App) {
+        app.register_type::<Emitter>()
+            .register_type::<EmissionSeed>()
+            .init_resource::<EmissionSeed>()
+            .init_resource::<NewParticles>()
+            .add_systems(
+                FixedUpdate,
+                (emit_particles, spawn_particles).chain().in_set(WeatheringSystems::Emit),
+            );
+    }
+}

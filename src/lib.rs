@@ -1,0 +1,61 @@
+#![doc = include_str!("../README.md")]
+
+pub mod clock;
+pub mod collision;
+pub mod effect;
+pub mod emitter;
+pub mod material;
+pub mod overlay;
+pub mod particle;
+pub mod scenes;
+pub mod schedule;
+
+use bevy::app::PluginGroupBuilder;
+use bevy::prelude::*;
+
+/// What a Bevy app needs to get things wet.
+pub mod prelude {
+    pub use crate::WeatheringPlugins;
+    pub use crate::clock::WeatheringClock;
+    pub use crate::collision::{ReportImpacts, SurfaceImpact};
+    pub use crate::effect::WeatherEffect;
+    pub use crate::emitter::{Emitter, EmitterShape};
+    pub use crate::material::PorousMaterial;
+    pub use crate::overlay::{Weatherable, Wrap};
+    pub use crate::particle::Forces;
+    pub use crate::schedule::WeatheringSystems;
+}
+
+/// Everything: particles, collision, splats, wet materials. Each part can be left out or replaced.
+///
+/// | plugin | does | needs a render app |
+/// |---|---|---|
+/// | [`WeatheringSchedulePlugin`](schedule::WeatheringSchedulePlugin) | orders the sets of a tick | no |
+/// | [`ClockPlugin`](clock::ClockPlugin) | counts ticks | no |
+/// | [`EffectPlugin`](effect::EffectPlugin) | loads what falls | no |
+/// | [`EmitterPlugin`](emitter::EmitterPlugin) | spawns particles | no |
+/// | [`ParticlePlugin`](particle::ParticlePlugin) | moves and retires them | no |
+/// | [`CollisionPlugin`](collision::CollisionPlugin) | finds what they hit | no |
+/// | [`DepositPlugin`](overlay::DepositPlugin) | turns impacts into splats | no |
+/// | [`GpuOverlayPlugin`](overlay::GpuOverlayPlugin) | paints splats into maps | yes |
+/// | [`ParticleDrawPlugin`](particle::ParticleDrawPlugin) | draws particles in flight | yes |
+/// | [`PorousMaterialPlugin`](material::PorousMaterialPlugin) | draws wet surfaces | yes |
+///
+/// Without a render app the last three do nothing; add [`CpuOverlayPlugin`](overlay::CpuOverlayPlugin) to have maps.
+pub struct WeatheringPlugins;
+
+impl PluginGroup for WeatheringPlugins {
+    fn build(self) -> PluginGroupBuilder {
+        PluginGroupBuilder::start::<Self>()
+            .add(schedule::WeatheringSchedulePlugin)
+            .add(clock::ClockPlugin::default())
+            .add(effect::EffectPlugin)
+            .add(emitter::EmitterPlugin)
+            .add(particle::ParticlePlugin)
+            .add(collision::CollisionPlugin)
+            .add(overlay::DepositPlugin)
+            .add(overlay::GpuOverlayPlugin)
+            .add(particle::ParticleDrawPlugin)
+            .add(material::PorousMaterialPlugin)
+    }
+}

@@ -1,0 +1,191 @@
+//! Impacts become splats on the surfaces they hit.
+
+use bevy::prelude::*;
+
+use super::splat::pack_unorm;
+use super::{Splat, TexelAreas, Weatherable};
+use crate::clock::WeatheringClock;
+use crate::collision::{Impact, Impacts, SurfaceCollider};
+use crate::effect::{EffectTable, WeatherEffect};
+use crate::schedule::WeatheringSystems;
+
+/// Splats of a surface that nobody has painted yet, in the order of their impacts. A frame may hold any number of
+/// ticks: each adds its own; the painter empties it.
+#[derive(Component, Debug, Default)]
+pub struct SplatQueue(Vec<Splat>);
+
+impl SplatQueue {
+    /// The waiting splats.
+    pub fn splats(&self) -> &[Splat] {
+        &self.0
+    }
+
+    /// Adds a splat behind the others.
+    pub fn push(&mut self, splat: Splat) {
+        self.0.push(splat);
+    }
+
+    /// Whether nothing waits.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Forgets the splats, keeping the memory.
+    pub fn clear(&mut self) {
+        self.0.clear();
+    }
+
+    /// Moves the splats behind those in `painter`.
+    pub fn drain_into(&mut self, painter: &mut Vec<Splat>) {
+        painter.append(&mut self.0);
+    }
+}
+
+/// What a surface has received.
+#[derive(Component, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[reflect(Component)]
+pub struct SurfaceTotals {
+    /// Particles that hit it.
+    pub impacts: u64,
+    /// Water they carried, nanolitres.
+    pub water_nl: u64,
+}
+
+/// Gives surfaces their queues and fills them.
+pub struct DepositPlugin;
+
+impl Plugin for DepositPlugin {
+    fn build(&self, app: &mut App) {
+        app.register_type::<Weatherable>()
+            .register_type::<SurfaceTotals>()
+            .register_required_components::<Weatherable, SplatQueue>()
+            .register_required_components::<Weatherable, SurfaceTotals>()
+            .add_systems(PreUpdate, measure_texels)
+            .add_systems(FixedUpdate, deposit_splats.in_set(WeatheringSystems::Deposit));
+    }
+}
+
+/// Measures the texels of a surface when it gets its collider.
+pub(super) fn measure_texels(
+    mut commands: Commands,
+    new: Query<(Entity, &Weatherable, &SurfaceCollider, &GlobalTransform), Without<TexelAreas>>,
+) {
+    for (entity, surface, collider, transform) in &new {
+        let areas = TexelAreas::new(collider.0.triangles(), &transform.affine(), surface.texels());
+        commands.entity(entity).insert(areas);
+    }
+}
+
+/// Turns this tick's impacts into splats, in their order.
+pub fn deposit_splats(
+    clock: Res<WeatheringClock>,
+    impacts: Res<Impacts>,
+    effects: Res<EffectTable>,
+    mut surfaces: Query<(&Weatherable, &mut SplatQueue, &mut SurfaceTotals)>,
+) {
+    for impact in &impacts.0 {
+        let Ok((surface, mut queue, mut totals)) = surfaces.get_mut(impact.surface) else { continue };
+        let Some(effect) = effects.get(impact.effect) else { continue };
+        totals.impacts += 1;
+        totals.water_nl += u64::from(impact.volume_nl);
+        queue.push(splat_from_impact(impact, effect, surface, clock.tick()));
+    }
+}
+
+/// The stamp an impact leaves: as large in metres as the effect says, wherever the uvs are wide or narrow.
+pub fn splat_from_impact(impact: &Impact, effect: &WeatherEffect, surface: &Weatherable, tick: u32) -> Splat {
+    let size = surface.texels();
+    let varied = 1.0 + effect.stamp_radius_jitter * signed_hash(impact.sequence.0);
+    let radius_uv = impact.uv_per_metre * (effect.stamp_radius * varied);
+    let [r, g, b] = effect.diffuse.color;
+    let [reflectance, smoothness, unused] = effect.specular.color;
+    Splat {
+        center: Splat::center_from_uv(impact.uv, size, surface.wrap()),
+        radius: Splat::radius_from_uv(radius_uv, size),
+        water_nl: impact.volume_nl,
+        tick,
+        diffuse: pack_unorm([r, g, b, effect.diffuse.opacity]),
+        specular: pack_unorm([reflectance, smoothness, unused, effect.specular.opacity]),
+        bump: (effect.bump * 127.0).round() as i32,
+        bump_opacity: if effect.bump == 0.0 { 0 } else { 255 },
+        pad: [0; 2],
+    }
+}
+
+/// An even number in [-1, 1) from an integer: the output permutation of PCG (O'Neill 2014) as a hash.
+fn signed_hash(number: u32) -> f32 {
+    let state = number.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
+    ((word >> 22) ^ word) as f32 / (1u32 << 31) as f32 - 1.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::EffectIndex;
+    use crate::overlay::Wrap;
+    use crate::particle::Sequence;
+
+    fn impact(surface: Entity, number: u32) -> Impact {
+        Impact {
+            sequence: Sequence(number),
+            surface,
+            triangle: 0,
+            point: Vec3::ZERO,
+            normal: Vec3::Y,
+            uv: Vec2::new(0.5, 1.25),
+            uv_per_metre: Vec2::new(0.5, 0.25),
+            velocity: Vec3::NEG_Y,
+            effect: EffectIndex(0),
+            volume_nl: 4189,
+        }
+    }
+
+    #[test]
+    fn each_impact_is_one_splat_on_its_surface() {
+        let mut world = World::new();
+        let mut clock = WeatheringClock::new(60);
+        clock.advance();
+        world.insert_resource(clock);
+        let mut effects = EffectTable::default();
+        effects.insert(Handle::default(), WeatherEffect { stamp_radius: 0.125, ..default() });
+        world.insert_resource(effects);
+        let mut spawn =
+            || world.spawn((Weatherable::default(), SplatQueue::default(), SurfaceTotals::default())).id();
+        let (one, other) = (spawn(), spawn());
+        let gone = world.spawn_empty().id();
+        world.insert_resource(Impacts(vec![
+            impact(one, 4),
+            impact(other, 5),
+            impact(gone, 6),
+            impact(one, 7),
+        ]));
+
+        let mut schedule = Schedule::default();
+        schedule.add_systems(deposit_splats);
+        schedule.run(&mut world);
+
+        let totals = |surface| *world.get::<SurfaceTotals>(surface).unwrap();
+        assert_eq!(totals(one), SurfaceTotals { impacts: 2, water_nl: 8378 });
+        assert_eq!(totals(other), SurfaceTotals { impacts: 1, water_nl: 4189 });
+        let splat = world.get::<SplatQueue>(other).unwrap().splats()[0];
+        assert_eq!(splat.center, [256 * 256, 128 * 256]);
+        assert_eq!(splat.radius, [32 * 256, 16 * 256]);
+        assert_eq!((splat.water_nl, splat.tick), (4189, 1));
+    }
+
+    #[test]
+    fn clamped_surfaces_keep_stamps_at_their_edge() {
+        let surface = Weatherable { map_size: 64, wrap_u: Wrap::Clamp, wrap_v: Wrap::Clamp };
+        let splat =
+            splat_from_impact(&impact(Entity::PLACEHOLDER, 0), &WeatherEffect::default(), &surface, 1);
+        assert_eq!(splat.center, [32 * 256, 64 * 256 - 1]);
+        assert_eq!(splat.radius, [Splat::MIN_RADIUS; 2]);
+    }
+
+    #[test]
+    fn jitter_is_even_and_within_bounds() {
+        let mean: f32 = (0..10_000).map(signed_hash).inspect(|h| assert!(h.abs() <= 1.0)).sum::<f32>() / 1e4;
+        assert!(mean.abs() < 0.02, "{mean}");
+    }
+}

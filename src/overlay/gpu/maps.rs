@@ -1,0 +1,70 @@
+//! The textures and the buffer of a surface.
+
+use bevy::asset::RenderAssetUsages;
+use bevy::image::{ImageAddressMode, ImageSampler, ImageSamplerDescriptor};
+use bevy::prelude::*;
+use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat, TextureUsages};
+use bevy::render::storage::ShaderBuffer;
+
+use crate::overlay::{TexelState, Weatherable, Wrap};
+
+/// The maps of a surface on the GPU. Begin empty; all zeros mean "nothing here".
+#[derive(Component, Reflect, Debug, Clone)]
+#[reflect(Component)]
+pub struct Overlays {
+    /// Colour over the surface's; linear `rgba8unorm`, premultiplied.
+    pub diffuse: Handle<Image>,
+    /// Reflectance, smoothness, unused, coverage; `rgba8unorm`, premultiplied.
+    pub specular: Handle<Image>,
+    /// Slope along u and v (0.5 is flat), unused, coverage; `rgba8unorm`, premultiplied.
+    pub normal: Handle<Image>,
+    /// [`TexelState`] of each texel, row by row.
+    pub state: Handle<ShaderBuffer>,
+}
+
+impl Overlays {
+    fn new(surface: &Weatherable, images: &mut Assets<Image>, buffers: &mut Assets<ShaderBuffer>) -> Self {
+        let size = surface.texels();
+        let mut image = |name| images.add(overlay_image(size, surface.wrap(), name));
+        let (diffuse, specular, normal) =
+            (image("diffuse overlay"), image("specular overlay"), image("normal overlay"));
+        let bytes = (size * size) as usize * size_of::<TexelState>();
+        // wgpu zeroes what is created without data.
+        let state = buffers.add(ShaderBuffer::with_size(bytes, RenderAssetUsages::RENDER_WORLD));
+        Self { diffuse, specular, normal, state }
+    }
+}
+
+fn overlay_image(size: u32, wrap: [Wrap; 2], name: &'static str) -> Image {
+    let extent = Extent3d { width: size, height: size, depth_or_array_layers: 1 };
+    let mut image = Image::new_uninit(
+        extent,
+        TextureDimension::D2,
+        TextureFormat::Rgba8Unorm,
+        RenderAssetUsages::RENDER_WORLD,
+    );
+    image.texture_descriptor.label = Some(name);
+    image.texture_descriptor.usage |= TextureUsages::STORAGE_BINDING;
+    let [address_mode_u, address_mode_v] = wrap.map(|wrap| match wrap {
+        Wrap::Repeat => ImageAddressMode::Repeat,
+        Wrap::Clamp => ImageAddressMode::ClampToEdge,
+    });
+    image.sampler = ImageSampler::Descriptor(ImageSamplerDescriptor {
+        address_mode_u,
+        address_mode_v,
+        ..ImageSamplerDescriptor::linear()
+    });
+    image
+}
+
+/// Gives new surfaces their maps, and new ones when their size or edges change.
+pub(super) fn add_overlays(
+    mut commands: Commands,
+    mut images: ResMut<Assets<Image>>,
+    mut buffers: ResMut<Assets<ShaderBuffer>>,
+    changed: Query<(Entity, &Weatherable), Changed<Weatherable>>,
+) {
+    for (entity, surface) in &changed {
+        commands.entity(entity).insert(Overlays::new(surface, &mut images, &mut buffers));
+    }
+}

@@ -1,0 +1,48 @@
+//! Painting splats on the GPU: one compute pass before the cameras draw.
+//!
+//! Main world: every surface gets textures and a state buffer ([`Overlays`]). Extract moves the waiting splats over
+//! (each exactly once, however many ticks the frame held). Prepare sorts them into tiles and uploads them; until
+//! the pipeline and the maps exist, they wait. The pass dispatches one workgroup per touched tile: a surface
+//! without new splats costs nothing, which [`SplatStats`] shows.
+
+mod maps;
+mod pass;
+mod prepare;
+
+use bevy::asset::embedded_asset;
+use bevy::core_pipeline::schedule::camera_driver;
+use bevy::prelude::*;
+use bevy::render::renderer::RenderGraph;
+use bevy::render::{ExtractSchedule, Render, RenderApp, RenderStartup, RenderSystems};
+use bevy::shader::load_shader_library;
+
+pub use maps::Overlays;
+pub use prepare::SplatStats;
+
+/// Paints splats with a compute pass. Needs a render app; without one it does nothing and splats pile up, so leave
+/// it out there and add [`CpuOverlayPlugin`](super::CpuOverlayPlugin).
+pub struct GpuOverlayPlugin;
+
+impl Plugin for GpuOverlayPlugin {
+    fn build(&self, app: &mut App) {
+        if app.get_sub_app(RenderApp).is_none() {
+            return;
+        }
+        load_shader_library!(app, "../../../shaders/common/kernel.wgsl");
+        embedded_asset!(app, "../../../shaders/splat.wgsl");
+
+        let stats = SplatStats::default();
+        app.insert_resource(stats.clone()).add_systems(PreUpdate, maps::add_overlays);
+
+        let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
+        render_app
+            .insert_resource(stats)
+            .init_resource::<prepare::PendingSplats>()
+            .init_resource::<prepare::SplatBatches>()
+            .add_systems(RenderStartup, pass::init_splat_pipeline)
+            .add_systems(ExtractSchedule, prepare::extract_splats)
+            .add_systems(Render, prepare::prepare_splats.in_set(RenderSystems::PrepareBindGroups))
+            // Materials sample the maps that this pass writes.
+            .add_systems(RenderGraph, pass::paint_splats.before(camera_driver));
+    }
+}

@@ -1,0 +1,221 @@
+//! Splats on their way from the main world to the GPU.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use bevy::ecs::entity::EntityHashMap;
+use bevy::prelude::*;
+use bevy::render::MainWorld;
+use bevy::render::render_asset::RenderAssets;
+use bevy::render::render_resource::{
+    BindGroup, BindGroupEntries, BufferUsages, DynamicUniformBuffer, PipelineCache, RawBufferVec, ShaderType,
+};
+use bevy::render::renderer::{RenderDevice, RenderQueue};
+use bevy::render::storage::GpuShaderBuffer;
+use bevy::render::texture::GpuImage;
+
+use super::maps::Overlays;
+use super::pass::SplatPipeline;
+use crate::overlay::{Splat, SplatQueue, TileBins, TileHeader, Weatherable, Wrap};
+
+/// What the pass needs to know about one surface. `SurfaceBatch` in `shaders/splat.wgsl` has the same fields.
+#[derive(ShaderType, Debug, Clone, Copy)]
+pub struct SurfaceBatch {
+    /// Texels along each side of the maps.
+    pub size: u32,
+    /// The batch's first row in the tile buffer.
+    pub first_tile: u32,
+    /// Edges along u and v: 1 clamps, 0 repeats.
+    pub clamped: UVec2,
+}
+
+/// What the pass has done since the start; the same numbers in the main and in the render world.
+#[derive(Resource, Clone, Default)]
+pub struct SplatStats(Arc<Counters>);
+
+#[derive(Default)]
+struct Counters {
+    splats: AtomicU64,
+    dispatches: AtomicU64,
+    tiles: AtomicU64,
+}
+
+impl SplatStats {
+    /// Splats painted.
+    pub fn splats(&self) -> u64 {
+        self.0.splats.load(Ordering::Relaxed)
+    }
+
+    /// Dispatches: one per surface and frame with new splats.
+    pub fn dispatches(&self) -> u64 {
+        self.0.dispatches.load(Ordering::Relaxed)
+    }
+
+    /// Tiles visited.
+    pub fn tiles(&self) -> u64 {
+        self.0.tiles.load(Ordering::Relaxed)
+    }
+
+    fn add(&self, splats: usize, tiles: usize) {
+        self.0.splats.fetch_add(splats as u64, Ordering::Relaxed);
+        self.0.tiles.fetch_add(tiles as u64, Ordering::Relaxed);
+        self.0.dispatches.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+/// Splats in the render world that are not painted yet, by surface.
+#[derive(Resource, Default)]
+pub(super) struct PendingSplats {
+    surfaces: Vec<PendingSurface>,
+    by_entity: EntityHashMap<usize>,
+}
+
+struct PendingSurface {
+    entity: Entity,
+    surface: Weatherable,
+    overlays: Overlays,
+    splats: Vec<Splat>,
+}
+
+/// Moves the waiting splats into the render world.
+pub(super) fn extract_splats(
+    mut main_world: ResMut<MainWorld>,
+    mut pending: ResMut<PendingSplats>,
+    mut query: Local<
+        Option<QueryState<(Entity, &'static Weatherable, &'static Overlays, &'static mut SplatQueue)>>,
+    >,
+) {
+    let query = query.get_or_insert_with(|| main_world.query());
+    let PendingSplats { surfaces, by_entity } = &mut *pending;
+    for (entity, surface, overlays, mut queue) in query.iter_mut(&mut main_world) {
+        if queue.is_empty() {
+            continue;
+        }
+        let index = *by_entity.entry(entity).or_insert_with(|| {
+            surfaces.push(PendingSurface {
+                entity,
+                surface: *surface,
+                overlays: overlays.clone(),
+                splats: Vec::new(),
+            });
+            surfaces.len() - 1
+        });
+        let waiting = &mut surfaces[index];
+        (waiting.surface, waiting.overlays) = (*surface, overlays.clone());
+        queue.drain_into(&mut waiting.splats);
+    }
+    // The handles here keep the maps of surfaces that are gone alive; let go of them.
+    let gone = |waiting: &PendingSurface| main_world.get_entity(waiting.entity).is_err();
+    if surfaces.iter().any(gone) {
+        surfaces.retain(|waiting| !gone(waiting));
+        by_entity.clear();
+        by_entity.extend(surfaces.iter().enumerate().map(|(index, waiting)| (waiting.entity, index)));
+    }
+}
+
+/// What this frame's pass will do.
+#[derive(Resource)]
+pub(super) struct SplatBatches {
+    batches: DynamicUniformBuffer<SurfaceBatch>,
+    splats: RawBufferVec<Splat>,
+    tiles: RawBufferVec<TileHeader>,
+    list: RawBufferVec<u32>,
+    bins: TileBins,
+    /// The buffers above.
+    pub(super) frame: Option<BindGroup>,
+    pub(super) jobs: Vec<Job>,
+}
+
+/// One dispatch.
+pub(super) struct Job {
+    pub(super) surface: BindGroup,
+    pub(super) batch_offset: u32,
+    pub(super) tiles: u32,
+}
+
+impl Default for SplatBatches {
+    fn default() -> Self {
+        Self {
+            batches: DynamicUniformBuffer::default(),
+            splats: RawBufferVec::new(BufferUsages::STORAGE),
+            tiles: RawBufferVec::new(BufferUsages::STORAGE),
+            list: RawBufferVec::new(BufferUsages::STORAGE),
+            bins: TileBins::default(),
+            frame: None,
+            jobs: Vec::new(),
+        }
+    }
+}
+
+/// Sorts what is pending into tiles and uploads it.
+pub(super) fn prepare_splats(
+    mut pending: ResMut<PendingSplats>,
+    mut batches: ResMut<SplatBatches>,
+    stats: Res<SplatStats>,
+    pipeline: Res<SplatPipeline>,
+    cache: Res<PipelineCache>,
+    images: Res<RenderAssets<GpuImage>>,
+    buffers: Res<RenderAssets<GpuShaderBuffer>>,
+    device: Res<RenderDevice>,
+    queue: Res<RenderQueue>,
+) {
+    let SplatBatches { batches, splats, tiles, list, bins, frame, jobs } = &mut *batches;
+    jobs.clear();
+    if pending.surfaces.iter().all(|surface| surface.splats.is_empty())
+        || cache.get_compute_pipeline(pipeline.pipeline).is_none()
+    {
+        return;
+    }
+    batches.clear();
+    splats.clear();
+    tiles.clear();
+    list.clear();
+    for waiting in pending.surfaces.iter_mut().filter(|surface| !surface.splats.is_empty()) {
+        let maps = &waiting.overlays;
+        let (Some(diffuse), Some(specular), Some(normal), Some(state)) = (
+            images.get(&maps.diffuse),
+            images.get(&maps.specular),
+            images.get(&maps.normal),
+            buffers.get(&maps.state),
+        ) else {
+            continue;
+        };
+        let (size, wrap) = (waiting.surface.texels(), waiting.surface.wrap());
+        let first_tile = tiles.len() as u32;
+        let first_splat = splats.len() as u32;
+        bins.bin(&waiting.splats, size, wrap, first_splat, tiles.values_mut(), list.values_mut());
+        splats.values_mut().extend_from_slice(&waiting.splats);
+        let touched = tiles.len() as u32 - first_tile;
+        let clamped = UVec2::from_array(wrap.map(|wrap| u32::from(wrap == Wrap::Clamp)));
+        jobs.push(Job {
+            surface: device.create_bind_group(
+                "weathering surface",
+                &cache.get_bind_group_layout(&pipeline.surface_layout),
+                &BindGroupEntries::sequential((
+                    &diffuse.texture_view,
+                    &specular.texture_view,
+                    &normal.texture_view,
+                    state.buffer.as_entire_buffer_binding(),
+                )),
+            ),
+            batch_offset: batches.push(&SurfaceBatch { size, first_tile, clamped }),
+            tiles: touched,
+        });
+        stats.add(waiting.splats.len(), touched as usize);
+        waiting.splats.clear();
+    }
+    batches.write_buffer(&device, &queue);
+    splats.write_buffer(&device, &queue);
+    tiles.write_buffer(&device, &queue);
+    list.write_buffer(&device, &queue);
+    let (Some(batches), Some(splats), Some(tiles), Some(list)) =
+        (batches.binding(), splats.binding(), tiles.binding(), list.binding())
+    else {
+        return;
+    };
+    *frame = Some(device.create_bind_group(
+        "weathering splats",
+        &cache.get_bind_group_layout(&pipeline.frame_layout),
+        &BindGroupEntries::sequential((batches, splats, tiles, list)),
+    ));
+}

@@ -1,0 +1,208 @@
+//! The arithmetic of a stamp, in integers.
+//!
+//! Positions are in 1/256 texel. Every function has a twin of the same name in `shaders/common/kernel.wgsl`; both
+//! use 32-bit integers alone, so CPU and GPU agree to the bit on any driver.
+//!
+//! # Water
+//! A stamp spreads its water by a separable bump, the quadratic B-spline along u times that along v, which is
+//! nearly round. What a texel gets is a difference of the bump's integral ([`coverage_cdf`]) at its two edges,
+//! first for its row, then within the row ([`share`]). The differences telescope: whatever is rounded off one
+//! texel is given to its neighbour, and the sum over all texels is exactly the water of the stamp.
+//!
+//! # Colour
+//! Colours lie under a round dome `(1 - d²)²` ([`falloff`]), composited in sequence ([`blend_over`]), premultiplied,
+//! rounded to 8 bits after each stamp, so that it does not matter how stamps are split over passes.
+
+/// Units of the fixed-point positions in one texel.
+pub const SUBTEXELS: i32 = 256;
+
+/// Steps across the bump in [`coverage_cdf`]: 256 for each of the three pieces of the spline.
+pub const CDF_STEPS: u32 = 768;
+
+/// `coverage_cdf` of the whole bump; 1.0 in 16-bit fixed point.
+pub const CDF_ONE: u32 = 65_536;
+
+/// Where a stamp lies along one axis; 1/256 texel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Axis {
+    /// Middle of the stamp: in [0, size), or beyond on a clamped axis.
+    pub center: i32,
+    /// Half its width, at least 1.
+    pub radius: i32,
+    /// Texels of the map along this axis.
+    pub size: i32,
+    /// Edges are clamped; else they repeat.
+    pub clamped: bool,
+}
+
+/// Integral of the quadratic B-spline from its left end to `step` of [`CDF_STEPS`] steps across it: 0..=[`CDF_ONE`].
+///
+/// With t = step/256 in [0, 3]: t³/6, then (-2t³ + 9t² - 9t + 3)/6, then 1 - (3-t)³/6. Rises monotonically, since
+/// it is an exact integer cubic before the one division.
+pub fn coverage_cdf(step: u32) -> u32 {
+    let t = step.min(CDF_STEPS);
+    // 6 · 256³ · integral, at most 100,663,296.
+    let scaled = if t < 256 {
+        t * t * t
+    } else if t < 512 {
+        (9 * 256 * t * t + 3 * 16_777_216) - (2 * t * t * t + 9 * 65_536 * t)
+    } else {
+        let rest = CDF_STEPS - t;
+        6 * 16_777_216 - rest * rest * rest
+    };
+    scaled / 1536
+}
+
+/// `value · part / 65,536`, rounded down, for `part` up to [`CDF_ONE`], without 64-bit numbers.
+pub fn scale_floor(value: u32, part: u32) -> u32 {
+    (value >> 16) * part + (((value & 0xffff) * part) >> 16)
+}
+
+/// The number of the texel `texel` in the row of texels that begins where the stamp begins: the first texel a stamp
+/// touches and those after it, across a repeating edge. Equal to `texel` on a clamped axis.
+pub fn unwrapped(axis: Axis, texel: i32) -> i32 {
+    if axis.clamped {
+        return texel;
+    }
+    let first = (axis.center - axis.radius) >> 8;
+    // Twice the size makes the number positive: the stamp begins at most one map away.
+    first + (texel - first + 2 * axis.size) % axis.size
+}
+
+/// Parts of a stamp that lie before the texel and before its end, along one axis. On a clamped axis the outermost
+/// texels own what lies beyond the edge.
+pub fn axis_coverage(axis: Axis, texel: i32) -> [u32; 2] {
+    let at = unwrapped(axis, texel);
+    let first_texel = axis.clamped && texel == 0;
+    let last_texel = axis.clamped && texel == axis.size - 1;
+    let before = if first_texel { 0 } else { coverage_cdf(cdf_step(axis, at * SUBTEXELS)) };
+    let until = if last_texel { CDF_ONE } else { coverage_cdf(cdf_step(axis, (at + 1) * SUBTEXELS)) };
+    [before, until]
+}
+
+/// How far across the bump `edge` lies, in steps of [`coverage_cdf`].
+fn cdf_step(axis: Axis, edge: i32) -> u32 {
+    let into = (edge - (axis.center - axis.radius)).clamp(0, 2 * axis.radius);
+    into as u32 * CDF_STEPS / (2 * axis.radius as u32)
+}
+
+/// Water that a texel gets from a stamp of `volume`, by the coverage of its column and row.
+pub fn share(volume: u32, column: [u32; 2], row: [u32; 2]) -> u32 {
+    let in_row = scale_floor(volume, row[1]) - scale_floor(volume, row[0]);
+    scale_floor(in_row, column[1]) - scale_floor(in_row, column[0])
+}
+
+/// Distance of the texel's middle from the stamp's, along one axis; 256 is the radius.
+pub fn axis_offset(axis: Axis, texel: i32) -> i32 {
+    let from_center = unwrapped(axis, texel) * SUBTEXELS + SUBTEXELS / 2 - axis.center;
+    // Clamped before scaling: beyond the radius it does not matter by how much.
+    from_center.clamp(-2 * axis.radius, 2 * axis.radius) * 256 / axis.radius
+}
+
+/// The dome `(1 - d²)²` at an offset in 1/256 radius: 0..=4096.
+pub fn falloff(offset: [i32; 2]) -> u32 {
+    let square = (offset[0] * offset[0] + offset[1] * offset[1]) as u32;
+    let height = 65_536 - square.min(65_536);
+    ((height >> 4) * (height >> 4)) >> 12
+}
+
+/// `opacity` (0..=255) under the dome.
+pub fn stamp_alpha(opacity: u32, falloff: u32) -> u32 {
+    (opacity * falloff + 2048) >> 12
+}
+
+/// One channel of `source` over `under`, 0..=255, premultiplied: `source · alpha + under · (1 - alpha)`, rounded.
+pub fn blend_over(source: u32, alpha: u32, under: u32) -> u32 {
+    (source * alpha + under * (255 - alpha) + 127) / 255
+}
+
+/// The slope of a dome of height `bump` (-127..=127) at an offset along one axis, as a colour: 128 is flat.
+pub fn slope_color(bump: i32, offset: i32) -> u32 {
+    (128 + (bump * offset / 256).clamp(-127, 127)) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_integral_rises_from_nothing_to_one() {
+        assert_eq!(coverage_cdf(0), 0);
+        assert_eq!(coverage_cdf(CDF_STEPS / 2), CDF_ONE / 2);
+        assert_eq!(coverage_cdf(CDF_STEPS), CDF_ONE);
+        assert_eq!(coverage_cdf(u32::MAX), CDF_ONE);
+        for step in 0..CDF_STEPS {
+            let (here, next) = (coverage_cdf(step), coverage_cdf(step + 1));
+            assert!(here <= next && next - here < 400, "step {step}: {here} {next}");
+            let mirrored = CDF_ONE - coverage_cdf(CDF_STEPS - step);
+            assert!(here.abs_diff(mirrored) <= 1, "not symmetric at {step}");
+        }
+    }
+
+    #[test]
+    fn scale_floor_is_a_64_bit_product() {
+        for value in [0, 1, 65_535, 65_536, 123_456_789, u32::MAX] {
+            for part in [0, 1, 77, 32_768, 65_535, CDF_ONE] {
+                let expected = (u64::from(value) * u64::from(part)) >> 16;
+                assert_eq!(u64::from(scale_floor(value, part)), expected, "{value} · {part}");
+            }
+        }
+    }
+
+    /// Sum of the water over a whole map.
+    fn deposited(u: Axis, v: Axis, volume: u32) -> u64 {
+        let column = |x| axis_coverage(u, x);
+        (0..v.size)
+            .flat_map(|y| (0..u.size).map(move |x| (x, axis_coverage(v, y))))
+            .map(|(x, row)| u64::from(share(volume, column(x), row)))
+            .sum()
+    }
+
+    #[test]
+    fn every_nanolitre_ends_up_in_the_map_wherever_the_stamp_lies() {
+        for clamped in [false, true] {
+            for center in [0, 1, 127, 128, 255, 16 * 128, 16 * 256 - 1] {
+                for radius in [1, 40, 128, 300, 1000, 1900] {
+                    let axis = Axis { center, radius, size: 16, clamped };
+                    let other = Axis { center: 2000, radius: 500, size: 16, clamped };
+                    for volume in [0, 1, 4189, 1_000_000_000, u32::MAX] {
+                        assert_eq!(deposited(axis, other, volume), u64::from(volume), "{axis:?}");
+                        assert_eq!(deposited(other, axis, volume), u64::from(volume), "{axis:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_stamp_over_the_edge_is_the_stamp_in_the_middle_moved() {
+        let axis = |center| Axis { center, radius: 700, size: 32, clamped: false };
+        let middle = axis(16 * 256 + 50);
+        let edge = axis(50);
+        for texel in 0..32 {
+            let moved = (texel + 16) % 32;
+            assert_eq!(axis_coverage(edge, texel), axis_coverage(middle, moved));
+            assert_eq!(axis_offset(edge, texel), axis_offset(middle, moved));
+        }
+    }
+
+    #[test]
+    fn the_dome_is_round_and_ends_at_the_radius() {
+        assert_eq!(falloff([0, 0]), 4096);
+        assert_eq!(falloff([256, 0]), 0);
+        assert_eq!(falloff([-300, 200]), 0);
+        assert_eq!(falloff([181, 0]).abs_diff(1024) < 20, true);
+        assert_eq!(falloff([120, 35]), falloff([-35, 120]));
+    }
+
+    #[test]
+    fn blending_has_the_right_ends() {
+        for value in 0..=255 {
+            assert_eq!(blend_over(value, 255, 33), value);
+            assert_eq!(blend_over(33, 0, value), value);
+            assert_eq!(blend_over(value, 128, value), value);
+        }
+        assert_eq!(stamp_alpha(255, 4096), 255);
+        assert_eq!((slope_color(127, 0), slope_color(127, 256), slope_color(-127, 256)), (128, 255, 1));
+    }
+}

@@ -1,0 +1,80 @@
+//! The maps of a surface, and painting impacts into them.
+//!
+//! Every [`Weatherable`] mesh gets overlay maps over its uv square: three colour maps that lie over its material's
+//! own (diffuse, specular, normal) and the [state](TexelState) of each texel: how much water it holds and since
+//! when. An impact becomes a [`Splat`] ([`deposit`]), and splats are painted in the order of their impacts.
+//!
+//! Two painters do the same arithmetic, in integers, so that they agree to the bit: a compute pass
+//! ([`GpuOverlayPlugin`]) that sorts splats into tiles and visits each touched texel once, and a plain loop over
+//! splats ([`CpuOverlayPlugin`]) for runs without a renderer and as the reference for tests. The arithmetic is
+//! in [`kernel`], with a WGSL twin.
+//!
+//! # Wraparound
+//! A stamp over the edge of the map continues at the opposite edge ([`Wrap::Repeat`]) or ends there
+//! ([`Wrap::Clamp`]: the water that would lie beyond stays in the edge texels). Either way every nanolitre of an
+//! impact ends up in the map.
+
+mod cpu;
+pub mod deposit;
+mod gpu;
+pub mod kernel;
+mod maps;
+mod splat;
+mod tiles;
+
+use bevy::prelude::*;
+use serde::{Deserialize, Serialize};
+
+pub use cpu::{CpuMaps, CpuOverlayPlugin};
+pub use deposit::{DepositPlugin, SplatQueue, SurfaceTotals, deposit_splats};
+pub use gpu::{GpuOverlayPlugin, Overlays, SplatStats};
+pub use maps::{TexelAreas, TexelState};
+pub use splat::Splat;
+pub use tiles::{TILE_SIZE, TileBins, TileHeader};
+
+/// Makes a mesh entity weatherable: it can be hit, and shows what hit it.
+///
+/// Needs a mesh with texture coordinates. Where a `StandardMaterial` is on the entity, it is exchanged for its
+/// weathered form with the same settings.
+#[derive(Component, Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq)]
+#[reflect(Component)]
+#[serde(deny_unknown_fields, default)]
+pub struct Weatherable {
+    /// Texels along each side of the maps; a multiple of [`TILE_SIZE`] from 16 to [`Self::MAX_MAP_SIZE`].
+    pub map_size: u32,
+    /// What happens at the left and right edge of the maps.
+    pub wrap_u: Wrap,
+    /// What happens at the upper and lower edge of the maps.
+    pub wrap_v: Wrap,
+}
+
+/// What happens to a stamp at an edge of the map.
+#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Wrap {
+    /// It goes on at the opposite edge; uvs outside 0..1 tile.
+    #[default]
+    Repeat,
+    /// It ends; uvs outside 0..1 are taken as the edge.
+    Clamp,
+}
+
+impl Weatherable {
+    /// The largest map: 16,384 tiles.
+    pub const MAX_MAP_SIZE: u32 = 2048;
+
+    /// `map_size`, brought into the range that is allowed.
+    pub fn texels(&self) -> u32 {
+        self.map_size.clamp(TILE_SIZE, Self::MAX_MAP_SIZE).next_multiple_of(TILE_SIZE)
+    }
+
+    /// Edge behaviour along u and v.
+    pub fn wrap(&self) -> [Wrap; 2] {
+        [self.wrap_u, self.wrap_v]
+    }
+}
+
+impl Default for Weatherable {
+    fn default() -> Self {
+        Self { map_size: 512, wrap_u: Wrap::Repeat, wrap_v: Wrap::Repeat }
+    }
+}

@@ -1,0 +1,106 @@
+//! One stamp, ready to paint.
+
+use bevy::prelude::*;
+use bytemuck::{Pod, Zeroable};
+
+use super::Wrap;
+use super::kernel::{Axis, SUBTEXELS};
+
+/// A stamp on the maps of one surface. A row of the GPU's splat buffer: `Splat` in `shaders/common/splat.wgsl` has
+/// the same fields in the same order.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub struct Splat {
+    /// Middle of the stamp, in 1/256 texel of the map.
+    pub center: [i32; 2],
+    /// Half its width and height, in 1/256 texel.
+    pub radius: [i32; 2],
+    /// Water it leaves; nanolitres.
+    pub water_nl: u32,
+    /// Tick of the impact, 1 or more.
+    pub tick: u32,
+    /// Colour (red in the lowest byte) and in the highest byte the opacity.
+    pub diffuse: u32,
+    /// Reflectance, smoothness, unused, opacity; lowest byte first.
+    pub specular: u32,
+    /// Slope of the dome at its rim, -127..=127.
+    pub bump: i32,
+    /// Opacity of the bump, 0..=255.
+    pub bump_opacity: u32,
+    /// To 48 bytes.
+    pub pad: [u32; 2],
+}
+
+impl Splat {
+    /// Half a texel, the smallest radius: below it a stamp could fall between texels' middles and leave no colour.
+    pub const MIN_RADIUS: i32 = SUBTEXELS / 2;
+
+    /// Middle of a stamp in 1/256 texel, from a uv: brought into the map by the edge behaviour of the axis.
+    pub fn center_from_uv(uv: Vec2, size: u32, wrap: [Wrap; 2]) -> [i32; 2] {
+        let axis = |coordinate: f32, wrap| {
+            let inside = match wrap {
+                // `rem_euclid` may round up to 1.
+                Wrap::Repeat => coordinate.rem_euclid(1.0),
+                Wrap::Clamp => coordinate,
+            };
+            let end = size as i32 * SUBTEXELS;
+            ((inside * end as f32).floor() as i32).clamp(0, end - 1)
+        };
+        [axis(uv.x, wrap[0]), axis(uv.y, wrap[1])]
+    }
+
+    /// A radius in 1/256 texel, from one in uv; kept so small that a stamp never overlaps itself.
+    pub fn radius_from_uv(uv: Vec2, size: u32) -> [i32; 2] {
+        let largest = (size as i32 - 1) * SUBTEXELS / 2;
+        let axis = |radius: f32| {
+            ((radius * size as f32 * SUBTEXELS as f32).round() as i32).clamp(Self::MIN_RADIUS, largest)
+        };
+        [axis(uv.x), axis(uv.y)]
+    }
+
+    /// The stamp along u (0) or v (1) on a map of this size.
+    pub fn axis(&self, index: usize, size: u32, wrap: [Wrap; 2]) -> Axis {
+        Axis {
+            center: self.center[index],
+            radius: self.radius[index],
+            size: size as i32,
+            clamped: wrap[index] == Wrap::Clamp,
+        }
+    }
+
+    /// First and last texel the stamp touches along an axis, before wrapping or clamping.
+    pub fn span(&self, index: usize) -> (i32, i32) {
+        let (center, radius) = (self.center[index], self.radius[index]);
+        ((center - radius) >> 8, (center + radius - 1) >> 8)
+    }
+}
+
+/// Four values of 0..=1 as bytes, the first in the lowest.
+pub(crate) fn pack_unorm(values: [f32; 4]) -> u32 {
+    u32::from_le_bytes(values.map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn uvs_in_any_tile_are_brought_into_the_map() {
+        let repeat = [Wrap::Repeat; 2];
+        let clamp = [Wrap::Clamp; 2];
+        let center = |u, wrap| Splat::center_from_uv(Vec2::new(u, 0.5), 64, wrap)[0];
+        assert_eq!(center(0.25, repeat), 16 * 256);
+        assert_eq!(center(3.25, repeat), 16 * 256);
+        assert_eq!(center(-0.75, repeat), 16 * 256);
+        assert_eq!(center(-1.0e-9, repeat), 64 * 256 - 1);
+        assert_eq!(center(1.5, clamp), 64 * 256 - 1);
+        assert_eq!(center(-7.0, clamp), 0);
+        assert_eq!(center(1.0e30, clamp), 64 * 256 - 1);
+    }
+
+    #[test]
+    fn radii_stay_between_half_a_texel_and_half_the_map() {
+        assert_eq!(Splat::radius_from_uv(Vec2::new(0.0, 100.0), 64), [128, 63 * 128]);
+        assert_eq!(Splat::radius_from_uv(Vec2::splat(0.125), 64), [8 * 256; 2]);
+    }
+}

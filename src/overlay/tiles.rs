@@ -1,0 +1,140 @@
+//! Sorting splats into tiles, so that the GPU touches each texel once.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::{Splat, Wrap};
+
+/// Texels along each side of a tile: one workgroup.
+pub const TILE_SIZE: u32 = 16;
+
+/// One touched tile: a row of the GPU's tile buffer.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub struct TileHeader {
+    /// Column of the tile.
+    pub x: u32,
+    /// Row of the tile.
+    pub y: u32,
+    /// Where its splats begin in the list.
+    pub start: u32,
+    /// How many they are.
+    pub count: u32,
+}
+
+/// For every tile that a batch of splats touches, which splats, in their order. Reuses its memory from batch to batch.
+#[derive(Debug, Default)]
+pub struct TileBins {
+    /// Splats per tile of the current map; all zero between batches.
+    counts: Vec<u32>,
+    /// Tiles with a count above zero.
+    touched: Vec<u32>,
+    /// (tile, splat), in splat order.
+    pairs: Vec<(u32, u32)>,
+}
+
+impl TileBins {
+    /// Appends the touched tiles of one surface to `headers`, and their splats to `list`, as numbers from
+    /// `first_splat` on. Tiles come in ascending order, splats within a tile in theirs.
+    pub fn bin(
+        &mut self,
+        splats: &[Splat],
+        size: u32,
+        wrap: [Wrap; 2],
+        first_splat: u32,
+        headers: &mut Vec<TileHeader>,
+        list: &mut Vec<u32>,
+    ) {
+        let side = (size / TILE_SIZE) as usize;
+        if self.counts.len() < side * side {
+            self.counts.resize(side * side, 0);
+        }
+        for (number, splat) in splats.iter().enumerate() {
+            for row in tiles_on_axis(splat, 1, side, wrap[1]) {
+                for column in tiles_on_axis(splat, 0, side, wrap[0]) {
+                    let tile = row * side + column;
+                    if self.counts[tile] == 0 {
+                        self.touched.push(tile as u32);
+                    }
+                    self.counts[tile] += 1;
+                    self.pairs.push((tile as u32, first_splat + number as u32));
+                }
+            }
+        }
+        // A counting sort: `counts` turns into the place where a tile's next splat goes.
+        self.touched.sort_unstable();
+        let mut start = list.len() as u32;
+        list.resize(list.len() + self.pairs.len(), 0);
+        for &tile in &self.touched {
+            let count = std::mem::replace(&mut self.counts[tile as usize], start);
+            headers.push(TileHeader { x: tile % side as u32, y: tile / side as u32, start, count });
+            start += count;
+        }
+        for &(tile, splat) in &self.pairs {
+            let place = &mut self.counts[tile as usize];
+            list[*place as usize] = splat;
+            *place += 1;
+        }
+        for tile in self.touched.drain(..) {
+            self.counts[tile as usize] = 0;
+        }
+        self.pairs.clear();
+    }
+}
+
+/// Tiles a splat touches along one axis, each once.
+fn tiles_on_axis(splat: &Splat, axis: usize, side: usize, wrap: Wrap) -> impl Iterator<Item = usize> + Clone {
+    let tile = TILE_SIZE as i32;
+    let (first, last) = splat.span(axis);
+    let (first, last) = (first.div_euclid(tile), last.div_euclid(tile));
+    let side = side as i32;
+    let (first, last) = match wrap {
+        // A stamp that goes all the way round ends in the tile it began in.
+        Wrap::Repeat => (first, last.min(first + side - 1)),
+        Wrap::Clamp => (first.clamp(0, side - 1), last.clamp(0, side - 1)),
+    };
+    (first..=last).map(move |tile| tile.rem_euclid(side) as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    fn splat(center: [i32; 2], radius: i32) -> Splat {
+        Splat { center: center.map(|c| c * 256), radius: [radius * 256; 2], ..Splat::zeroed() }
+    }
+
+    fn tiles_of(splats: &[Splat], size: u32, wrap: [Wrap; 2]) -> Vec<((u32, u32), Vec<u32>)> {
+        let (mut bins, mut headers, mut list) = (TileBins::default(), vec![], vec![]);
+        for _ in 0..2 {
+            headers.clear();
+            list.clear();
+            bins.bin(splats, size, wrap, 0, &mut headers, &mut list);
+        }
+        assert!(bins.counts.iter().all(|&count| count == 0), "bins are clean between batches");
+        headers.iter().map(|h| ((h.x, h.y), list[h.start as usize..][..h.count as usize].to_vec())).collect()
+    }
+
+    #[test]
+    fn a_corner_stamp_touches_the_four_corners() {
+        let tiles = tiles_of(&[splat([0, 0], 3)], 64, [Wrap::Repeat; 2]);
+        let touched: Vec<_> = tiles.iter().map(|(tile, _)| *tile).collect();
+        assert_eq!(touched, [(0, 0), (3, 0), (0, 3), (3, 3)]);
+        assert_eq!(tiles_of(&[splat([0, 0], 3)], 64, [Wrap::Clamp; 2]), [((0, 0), vec![0])]);
+    }
+
+    #[test]
+    fn splats_keep_their_order_within_a_tile() {
+        let splats = [splat([8, 8], 2), splat([40, 8], 2), splat([9, 9], 2), splat([16, 8], 2)];
+        let tiles = tiles_of(&splats, 64, [Wrap::Repeat; 2]);
+        assert_eq!(tiles, [((0, 0), vec![0, 2, 3]), ((1, 0), vec![3]), ((2, 0), vec![1])]);
+    }
+
+    #[test]
+    fn a_stamp_as_large_as_the_map_is_in_every_tile_once() {
+        let largest = Splat { center: [77, 0], radius: [63 * 128; 2], ..Splat::zeroed() };
+        let tiles = tiles_of(&[largest], 64, [Wrap::Repeat; 2]);
+        assert_eq!(tiles.len(), 16);
+        assert!(tiles.iter().all(|(_, splats)| splats == &[0]));
+    }
+}

@@ -1,0 +1,141 @@
+//! One step of motion: gravity, wind and drag.
+
+use bevy::prelude::*;
+
+use super::{Forces, Lifespan, Position, Velocity};
+use crate::clock::WeatheringClock;
+use crate::effect::{EffectIndex, EffectTable};
+
+/// Numbers of an effect that motion needs: a scratch row of [`integrate_particles`].
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Motion {
+    /// Acceleration, m/s².
+    gravity: Vec3,
+    /// Quadratic drag over mass, 1/m: g / v_terminal².
+    drag: f32,
+}
+
+impl Motion {
+    fn new(forces: &Forces, gravity_scale: f32, terminal_speed: f32) -> Self {
+        let drag = if terminal_speed > 0.0 { STANDARD_GRAVITY / terminal_speed.powi(2) } else { 0.0 };
+        Self { gravity: forces.gravity * gravity_scale, drag }
+    }
+
+    /// Velocity after `dt` seconds.
+    ///
+    /// Semi-implicit in the drag `-c |u| u` on the velocity `u` relative to the wind, so it is stable for any step:
+    /// a gust slows a particle down to the wind's speed, never past it.
+    fn step(&self, velocity: Vec3, wind: Vec3, dt: f32) -> Vec3 {
+        let braking = self.drag * (velocity - wind).length() * dt;
+        (velocity + self.gravity * dt + wind * braking) / (1.0 + braking)
+    }
+}
+
+/// The gravity that [terminal speeds](crate::effect::WeatherEffect::terminal_speed) refer to, m/s².
+const STANDARD_GRAVITY: f32 = 9.81;
+
+/// Below this many particles one thread is faster than waking others.
+const PARALLEL_BATCH: usize = 4096;
+
+/// Accelerates every particle and moves it by what is left of its tick, which is one fewer to live.
+pub fn integrate_particles(
+    clock: Res<WeatheringClock>,
+    forces: Res<Forces>,
+    effects: Res<EffectTable>,
+    mut motions: Local<Vec<Motion>>,
+    mut particles: Query<(&mut Position, &mut Velocity, &mut Lifespan, &EffectIndex)>,
+) {
+    motions.clear();
+    motions.extend(effects.rows().iter().map(|row| match &row.effect {
+        Some(effect) => Motion::new(&forces, effect.gravity_scale, effect.terminal_speed),
+        None => Motion::default(),
+    }));
+    let (motions, wind, tick) = (motions.as_slice(), forces.wind, clock.delta_secs());
+    particles.par_iter_mut().batching_strategy(super::batching(PARALLEL_BATCH)).for_each(
+        |(mut position, mut velocity, mut lifespan, effect)| {
+            // Change detection is for people who look at single particles; nobody pays for it here.
+            let position = position.bypass_change_detection();
+            let velocity = velocity.bypass_change_detection();
+            let lifespan = lifespan.bypass_change_detection();
+            lifespan.ticks_left = lifespan.ticks_left.saturating_sub(1);
+            let dt = tick * lifespan.moving_part();
+            velocity.0 = motions[usize::from(effect.0)].step(velocity.0, wind, dt);
+            position.0 += velocity.0 * dt;
+        },
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::WeatherEffect;
+
+    fn world_with(effect: WeatherEffect, forces: Forces) -> (World, EffectIndex) {
+        let mut world = World::new();
+        world.insert_resource(WeatheringClock::new(60));
+        world.insert_resource(forces);
+        let mut table = EffectTable::default();
+        let index = table.insert(Handle::default(), effect).unwrap();
+        world.insert_resource(table);
+        (world, index)
+    }
+
+    fn particle(velocity: Vec3, effect: EffectIndex, born_at: u16) -> impl Bundle {
+        (Position(Vec3::ZERO), Velocity(velocity), Lifespan { ticks_left: 9, born_at }, effect)
+    }
+
+    fn run(world: &mut World, ticks: usize) {
+        bevy::tasks::ComputeTaskPool::get_or_init(Default::default);
+        let mut schedule = Schedule::default();
+        schedule.add_systems(integrate_particles);
+        for _ in 0..ticks {
+            schedule.run(world);
+        }
+    }
+
+    #[test]
+    fn falls_to_terminal_speed_and_no_faster() {
+        let effect = WeatherEffect { terminal_speed: 6.55, ..default() };
+        let (mut world, index) = world_with(effect, Forces::default());
+        let drop = world.spawn(particle(Vec3::ZERO, index, 0)).id();
+        run(&mut world, 600);
+        let speed = world.get::<Velocity>(drop).unwrap().0.length();
+        assert!((speed - 6.55).abs() < 0.01, "{speed}");
+    }
+
+    #[test]
+    fn without_drag_it_keeps_the_wind_out_and_falls_freely() {
+        let effect = WeatherEffect { terminal_speed: 0.0, ..default() };
+        let (mut world, index) = world_with(effect, Forces { wind: Vec3::X * 50.0, ..default() });
+        let stone = world.spawn(particle(Vec3::ZERO, index, 0)).id();
+        run(&mut world, 60);
+        let velocity = world.get::<Velocity>(stone).unwrap().0;
+        assert!((velocity - Vec3::new(0.0, -9.81, 0.0)).length() < 1e-3, "{velocity}");
+    }
+
+    #[test]
+    fn a_storm_carries_light_particles_with_it() {
+        let effect = WeatherEffect { terminal_speed: 0.05, ..default() };
+        let (mut world, index) = world_with(effect, Forces { wind: Vec3::X * 30.0, ..default() });
+        let dust = world.spawn(particle(Vec3::ZERO, index, 0)).id();
+        run(&mut world, 120);
+        let velocity = world.get::<Velocity>(dust).unwrap().0;
+        assert!(velocity.x > 29.0 && velocity.x <= 30.0, "{velocity}");
+    }
+
+    #[test]
+    fn a_particle_born_within_the_tick_moves_only_the_rest_of_it() {
+        let effect = WeatherEffect { terminal_speed: 0.0, gravity_scale: 0.0, ..default() };
+        let (mut world, index) = world_with(effect, Forces::default());
+        let late = world.spawn(particle(Vec3::X * 60.0, index, 0x4000)).id();
+        run(&mut world, 1);
+        let moved = world.get::<Position>(late).unwrap().0.x;
+        assert!((moved - 0.75).abs() < 1e-5, "{moved}");
+    }
+
+    #[test]
+    fn the_swept_segment_ends_where_it_should_and_begins_a_little_early() {
+        let start = super::super::swept_start(Vec3::X, Vec3::X * 10.0, 0.1);
+        assert!(start.x < 0.0 && start.x > -2e-4, "{start}");
+    }
+}

@@ -1,0 +1,173 @@
+//! Particles: entities of small plain components, in one archetype, by the hundred thousand.
+//!
+//! A particle has no `Transform` and no children; it lives in table storage as columns of numbers and is spawned
+//! and retired in batches. One tick moves it by the forces of its [effect](crate::effect); the segment it moved
+//! is what [collision](crate::collision) casts. [`Velocity`] is constant over a tick, so the segment's start is
+//! not stored: it is [`swept_start`].
+//!
+//! | column | bytes |
+//! |---|---|
+//! | [`Position`] | 12 |
+//! | [`Velocity`] | 12 |
+//! | [`Lifespan`] | 4 |
+//! | [`Volume`] | 4 |
+//! | [`Sequence`] | 4 |
+//! | [`EffectIndex`] | 2 |
+
+mod draw;
+mod integrate;
+mod retire;
+
+use bevy::prelude::*;
+
+use crate::effect::EffectIndex;
+use crate::schedule::WeatheringSystems;
+
+pub use draw::{ParticleDrawPlugin, ParticleMesh};
+pub use integrate::integrate_particles;
+pub use retire::{Retired, collect_dead, retire_particles};
+
+/// Where a particle is at the end of the tick; metres, world space.
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
+#[component(storage = "Table")]
+pub struct Position(pub Vec3);
+
+/// Velocity during the tick; m/s.
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
+pub struct Velocity(pub Vec3);
+
+/// How long a particle has left, and when within its first tick it was born.
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Lifespan {
+    /// Ticks until it expires; at most [`Self::MAX_TICKS`].
+    pub ticks_left: u16,
+    /// In the tick of its birth: the part of the tick that had passed by then, in 1/65,536; 0 afterwards.
+    pub born_at: u16,
+}
+
+/// Water the particle carries; nanolitres, so that sums are exact.
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Volume(pub u32);
+
+/// A number no other living particle has. Gives impacts one order, whatever the threads do.
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Sequence(pub u32);
+
+/// Everything a particle is.
+pub type ParticleBundle = (Position, Velocity, Lifespan, Volume, Sequence, EffectIndex);
+
+/// Bytes of component data per particle.
+pub const BYTES_PER_PARTICLE: usize = size_of::<Position>()
+    + size_of::<Velocity>()
+    + size_of::<Lifespan>()
+    + size_of::<Volume>()
+    + size_of::<Sequence>()
+    + size_of::<EffectIndex>();
+
+impl Lifespan {
+    /// The longest life: 18 minutes at 60 ticks a second.
+    pub const MAX_TICKS: u16 = u16::MAX - 1;
+    const HIT: u16 = u16::MAX;
+
+    /// Ends the life of a particle that hit a surface.
+    pub fn mark_hit(&mut self) {
+        self.ticks_left = Self::HIT;
+    }
+
+    /// Whether [`Self::mark_hit`] ended it.
+    pub fn has_hit(self) -> bool {
+        self.ticks_left == Self::HIT
+    }
+
+    /// Whether the particle hit something or ran out of time.
+    pub fn is_over(self) -> bool {
+        self.ticks_left == 0 || self.has_hit()
+    }
+
+    /// The part of a tick that a particle moves: less than 1 only in the tick of its birth.
+    pub fn moving_part(self) -> f32 {
+        1.0 - f32::from(self.born_at) / 65_536.0
+    }
+}
+
+/// Where the segment that ended at `position` began. The way back is longer by 1e-4 of the segment than the way
+/// there, so that consecutive segments overlap and nothing slips between them.
+pub fn swept_start(position: Vec3, velocity: Vec3, seconds_moved: f32) -> Vec3 {
+    position - velocity * (seconds_moved * 1.0001)
+}
+
+/// Gravity and wind, the same everywhere.
+#[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq)]
+#[reflect(Resource)]
+pub struct Forces {
+    /// m/s².
+    pub gravity: Vec3,
+    /// m/s.
+    pub wind: Vec3,
+}
+
+impl Default for Forces {
+    fn default() -> Self {
+        Self { gravity: Vec3::new(0.0, -9.81, 0.0), wind: Vec3::ZERO }
+    }
+}
+
+/// What has happened to all particles so far. `emitted == alive + hit + expired` after every tick.
+#[derive(Resource, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[reflect(Resource)]
+pub struct ParticleCounts {
+    /// Particles spawned.
+    pub emitted: u64,
+    /// Particles in flight.
+    pub alive: u64,
+    /// Particles that hit a surface.
+    pub hit: u64,
+    /// Particles whose lifetime ran out.
+    pub expired: u64,
+    /// Particles not spawned because [`ParticleConfig::max_alive`] was reached; not part of `emitted`.
+    pub refused: u64,
+}
+
+/// Limits on particles.
+#[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+#[reflect(Resource)]
+pub struct ParticleConfig {
+    /// The most particles that may be in flight; what emitters would add beyond it is counted as refused.
+    pub max_alive: u32,
+}
+
+impl Default for ParticleConfig {
+    fn default() -> Self {
+        Self { max_alive: 2_000_000 }
+    }
+}
+
+/// Moves and retires particles.
+pub struct ParticlePlugin;
+
+impl Plugin for ParticlePlugin {
+    fn build(&self, app: &mut App) {
+        app.register_type::<Forces>()
+            .init_resource::<Forces>()
+            .init_resource::<ParticleConfig>()
+            .init_resource::<ParticleCounts>()
+            .init_resource::<Retired>()
+            .configure_sets(FixedUpdate, RetireParticles.in_set(WeatheringSystems::Trace))
+            .add_systems(
+                FixedUpdate,
+                (
+                    integrate_particles.in_set(WeatheringSystems::Integrate),
+                    (collect_dead, retire_particles).chain().in_set(RetireParticles),
+                ),
+            );
+    }
+}
+
+/// How loops over all particles are split: a batch below `min` particles is not worth a thread.
+pub(crate) fn batching(min: usize) -> bevy::ecs::batching::BatchingStrategy {
+    bevy::ecs::batching::BatchingStrategy::new().min_batch_size(min)
+}
+
+/// The last step of [`WeatheringSystems::Trace`]: despawning what hit or expired.
+#[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct RetireParticles;

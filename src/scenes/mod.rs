@@ -1,0 +1,17 @@
+//! What a scene is made of when no asset file brings it: meshes, stone, and light from a photograph.
+//!
+//! Everything here is computed on the CPU from a few numbers, is the same on every run, and ends in plain
+//! Bevy assets ([`Mesh`](bevy::mesh::Mesh), [`Image`](bevy::image::Image)), so a scene built from it needs
+//! no special treatment anywhere else. Nothing in this module spawns entities.
+//!
+//! | module | makes |
+//! |---|---|
+//! | [`meshes`] | a ground grid, a UV sphere and a vase, with normals, tangents and a UV layout to wet |
+//! | [`environment`] | a skybox and image-based light from an equirectangular photograph |
+//! | [`stone`] | tileable terracotta, sandstone and concrete |
+//! | [`mips`] | mip maps, which Bevy does not make, for these and for loaded photographs |
+
+pub mod environment;
+pub mod meshes;
+pub mod mips;
+pub mod stone;
