@@ -7,6 +7,8 @@ pub mod emitter;
 pub mod material;
 pub mod overlay;
 pub mod particle;
+pub mod replay;
+pub mod scenario;
 pub mod scenes;
 pub mod schedule;
 

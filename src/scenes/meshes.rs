@@ -441,6 +441,21 @@ mod tests {
     }
 
     #[test]
+    fn the_smallest_shapes_have_area() {
+        let ground = ground(Vec2::ONE, UVec2::ONE).expect("valid");
+        let sphere = uv_sphere(1.0, 3, 2).expect("valid");
+        let vase = vase(0.01, 3, 24).expect("valid");
+        for (mesh, triangles) in [(ground, 2), (sphere, 6), (vase, 144)] {
+            let parts = parts(&mesh);
+            assert_eq!(parts.triangles.len(), triangles);
+            for triangle in &parts.triangles {
+                let [a, b, c] = triangle.map(|i| parts.positions[i]);
+                assert!((b - a).cross(c - a).length() / 2.0 > 1e-12, "{triangle:?}");
+            }
+        }
+    }
+
+    #[test]
     fn bad_arguments_are_errors() {
         let not_positive = |result| matches!(result, Err(MeshError::NotPositive { .. }));
         assert!(not_positive(ground(Vec2::new(1.0, f32::NAN), UVec2::ONE)));

@@ -1,1 +1,23 @@
-fn main() {}
+//! `weathering`: replays scenarios to pictures and numbers, and opens them to play with.
+
+mod cli;
+mod replay;
+mod sandbox;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+fn main() -> ExitCode {
+    let result = match cli::Cli::parse().command {
+        cli::Command::Replay(arguments) => replay::run(&arguments),
+        cli::Command::Sandbox(arguments) => sandbox::run(&arguments),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use bevy::math::UVec2;
+use clap::{Args, Parser, Subcommand};
+
+/// Rain, hoses and dust on real meshes: replay scenarios, or play with them.
+#[derive(Parser, Debug)]
+#[command(version, about)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+pub enum Command {
+    /// Run a scenario without a window: pictures, maps, report.json
+    Replay(ReplayArgs),
+    /// Open a scenario in a window
+    Sandbox(SandboxArgs),
+}
+
+#[derive(Args, Debug)]
+pub struct ReplayArgs {
+    /// The scenario
+    pub file: PathBuf,
+    /// Folder for frame_00000.png, ..., maps/ and report.json; without it the report goes to standard output
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Pictures per second of weather time
+    #[arg(long, default_value_t = 24)]
+    pub fps: u32,
+    /// Size of the pictures
+    #[arg(long, default_value = "640x360", value_parser = parse_size)]
+    pub size: UVec2,
+    /// Seconds of weather time, in place of the scenario's
+    #[arg(long)]
+    pub seconds: Option<f32>,
+    /// Seed, in place of the scenario's
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// Threads to compute with [default: all cores]
+    #[arg(long)]
+    pub threads: Option<usize>,
+    /// Simulate only; needs no graphics driver, and gives the same digest
+    #[arg(long)]
+    pub no_render: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct SandboxArgs {
+    /// The scenario
+    #[arg(default_value = "assets/scenarios/hose.ron")]
+    pub file: PathBuf,
+    /// Folder for screenshots
+    #[arg(long, default_value = "out")]
+    pub out: PathBuf,
+}
+
+fn parse_size(text: &str) -> Result<UVec2, String> {
+    let parse = |number: &str| number.parse::<u32>().map_err(|error| format!("{number:?}: {error}"));
+    let (width, height) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT, like 640x360")?;
+    Ok(UVec2::new(parse(width)?, parse(height)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_two_numbers() {
+        assert_eq!(parse_size("640x360"), Ok(UVec2::new(640, 360)));
+        for wrong in ["640", "x", "640x-1", "axb", "1x2x3"] {
+            assert!(parse_size(wrong).is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! `weathering replay`.
+
+use std::error::Error;
+
+use bevy::log::tracing_subscriber;
+use bevy_weathering::replay::{ReplayOptions, replay};
+use bevy_weathering::scenario::Scenario;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::cli::ReplayArgs;
+
+pub fn run(arguments: &ReplayArgs) -> Result<(), Box<dyn Error>> {
+    tracing_subscriber::fmt().with_max_level(bevy::log::Level::WARN).with_writer(std::io::stderr).init();
+    let options = ReplayOptions {
+        out: arguments.out.clone(),
+        fps: arguments.fps,
+        size: arguments.size,
+        seconds: arguments.seconds,
+        seed: arguments.seed,
+        threads: arguments.threads,
+        render: !arguments.no_render,
+        ..ReplayOptions::new(Scenario::load(&arguments.file)?)
+    };
+    let bar = ProgressBar::no_length().with_style(
+        ProgressStyle::with_template("{bar:40} tick {pos}/{len}, {elapsed} gone, {eta} to go")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
+    );
+    let report = replay(&options, |progress| {
+        bar.set_length(progress.ticks.into());
+        bar.set_position(progress.tick.into());
+    })?;
+    bar.finish_and_clear();
+    match &arguments.out {
+        Some(out) => {
+            let hits = report.particles.hit;
+            println!("{hits} impacts, {} pictures, digest {}", report.timing.frames, report.digest);
+            println!("{}", out.join("report.json").display());
+        }
+        None => println!("{}", serde_json::to_string_pretty(&report)?),
+    }
+    Ok(())
+}

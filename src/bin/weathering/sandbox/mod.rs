@@ -1,0 +1,56 @@
+//! `weathering sandbox`: a scenario in a window.
+
+mod camera;
+mod keys;
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use bevy::asset::AssetPlugin;
+use bevy::prelude::*;
+use bevy_weathering::WeatheringPlugins;
+use bevy_weathering::replay::require_adapter;
+use bevy_weathering::scenario::{Scenario, ScenarioPlugin, ScenarioStatus};
+
+use crate::cli::SandboxArgs;
+
+/// Where screenshots go.
+#[derive(Resource)]
+struct ScreenshotFolder(PathBuf);
+
+pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
+    let loaded = Scenario::load(&arguments.file)?;
+    require_adapter()?;
+    if cfg!(target_os = "linux")
+        && std::env::var_os("DISPLAY").is_none()
+        && std::env::var_os("WAYLAND_DISPLAY").is_none()
+    {
+        return Err("no display: DISPLAY is not set; use `weathering replay`, or start one (Xvfb)".into());
+    }
+    let scenario = ScenarioPlugin::new(loaded.clone(), true)?;
+    let window = Window {
+        title: format!("weathering - {}", arguments.file.display()),
+        resolution: (1280, 720).into(),
+        ..default()
+    };
+    let exit = App::new()
+        .add_plugins(
+            DefaultPlugins
+                .set(WindowPlugin { primary_window: Some(window), ..default() })
+                .set(AssetPlugin { file_path: loaded.tree.to_string_lossy().into_owned(), ..default() }),
+        )
+        .add_plugins(WeatheringPlugins)
+        .add_plugins(scenario)
+        .insert_resource(ScreenshotFolder(arguments.out.clone()))
+        .add_plugins((camera::plugin, keys::plugin))
+        .add_systems(Update, quit_on_failure)
+        .run();
+    if exit.is_error() { Err("the scenario could not be shown; see above".into()) } else { Ok(()) }
+}
+
+fn quit_on_failure(status: Res<ScenarioStatus>, mut exit: MessageWriter<AppExit>) {
+    if let ScenarioStatus::Failed(error) = &*status {
+        error!("{error}");
+        exit.write(AppExit::error());
+    }
+}

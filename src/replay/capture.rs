@@ -1,0 +1,91 @@
+//! Pictures of the running scene.
+
+use std::io::Cursor;
+use std::path::Path;
+use std::time::Instant;
+
+use bevy::asset::RenderAssetUsages;
+use bevy::camera::RenderTarget;
+use bevy::prelude::*;
+use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat, TextureUsages};
+use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
+
+use super::{ReplayError, Run, give_up_after, write_atomic};
+
+/// Pictures that have come back from the GPU.
+#[derive(Resource, Default)]
+struct Pictures {
+    expected: usize,
+    done: Vec<(u32, Image)>,
+}
+
+/// Makes every camera draw into an image instead of a window.
+pub(super) fn add_target(world: &mut World, size: UVec2) -> Handle<Image> {
+    let mut image = Image::new_uninit(
+        Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
+        TextureDimension::D2,
+        TextureFormat::Rgba8UnormSrgb,
+        RenderAssetUsages::RENDER_WORLD,
+    );
+    image.texture_descriptor.usage |= TextureUsages::RENDER_ATTACHMENT;
+    let target = world.resource_mut::<Assets<Image>>().add(image);
+    let mut cameras = world.query_filtered::<Entity, With<Camera>>();
+    for camera in cameras.iter(world).collect::<Vec<_>>() {
+        world.entity_mut(camera).insert(RenderTarget::from(target.clone()));
+    }
+    world.init_resource::<Pictures>();
+    target
+}
+
+impl Run<'_> {
+    /// Asks for a picture of the next frame.
+    pub(super) fn capture(&mut self, frame: u32) -> Result<(), ReplayError> {
+        let (Some(target), Some(_)) = (&self.target, &self.options.out) else { return Ok(()) };
+        let screenshot = Screenshot::image(target.clone());
+        let world = self.app.world_mut();
+        world.resource_mut::<Pictures>().expected += 1;
+        world.spawn(screenshot).observe(
+            move |captured: On<ScreenshotCaptured>, mut pictures: ResMut<Pictures>| {
+                pictures.done.push((frame, captured.image.clone()));
+            },
+        );
+        Ok(())
+    }
+
+    /// Writes the pictures that have come.
+    pub(super) fn write_captures(&mut self) -> Result<(), ReplayError> {
+        let Some(out) = &self.options.out else { return Ok(()) };
+        let Some(mut pictures) = self.app.world_mut().get_resource_mut::<Pictures>() else { return Ok(()) };
+        let done = std::mem::take(&mut pictures.done);
+        pictures.expected -= done.len();
+        for (frame, image) in done {
+            write_png(&out.join(format!("frame_{frame:05}.png")), image)?;
+        }
+        Ok(())
+    }
+
+    /// Waits for the pictures still under way.
+    pub(super) fn finish_captures(&mut self) -> Result<(), ReplayError> {
+        let begun = Instant::now();
+        while self.app.world().get_resource::<Pictures>().is_some_and(|pictures| pictures.expected > 0) {
+            self.step(0)?;
+            give_up_after(begun, "the last pictures")?;
+        }
+        Ok(())
+    }
+}
+
+/// Writes a picture, without its alpha channel.
+///
+/// # Errors
+/// [`ReplayError::Encode`] and [`ReplayError::Write`] with the path.
+pub fn write_png(path: &Path, image: Image) -> Result<(), ReplayError> {
+    let encode = |source| ReplayError::Encode { path: path.into(), source };
+    let image = image
+        .try_into_dynamic()
+        .map_err(|error| encode(image::ImageError::IoError(std::io::Error::other(error.to_string()))))?;
+    let mut bytes = Cursor::new(Vec::new());
+    // The alpha channel of a finished picture means nothing.
+    image.to_rgb8().write_to(&mut bytes, image::ImageFormat::Png).map_err(encode)?;
+    write_atomic(path, bytes.get_ref())
+}

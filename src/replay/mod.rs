@@ -1,0 +1,266 @@
+//! Running a scenario without a window, as fast as it goes, to pictures, maps and a report.
+//!
+//! Frames are driven by hand: between two pictures exactly as many ticks run as the clock says, so what happens does
+//! not depend on the frame rate, nor on whether anything is drawn at all. Without a renderer splats are painted on
+//! the CPU by the same integer arithmetic, and the digest over impacts and amounts comes out the same.
+//!
+//! Nothing is written before the scene is loaded; each file is written under a temporary name and then renamed.
+
+mod app;
+mod capture;
+mod files;
+mod maps;
+mod report;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use bevy::prelude::*;
+use bevy::time::TimeUpdateStrategy;
+
+use crate::clock::WeatheringClock;
+use crate::scenario::{LoadedScenario, ScenarioError, ScenarioPlugin, ScenarioStatus};
+
+pub use app::require_adapter;
+pub use capture::write_png;
+pub use files::write_atomic;
+pub use maps::SurfaceMaps;
+pub use report::{ParticleReport, Report, SurfaceReport, Timing};
+
+/// What to run and what to write.
+#[derive(Debug, Clone)]
+pub struct ReplayOptions {
+    /// The scenario.
+    pub scenario: LoadedScenario,
+    /// Folder for `frame_*.png`, `maps/` and `report.json`; made if missing. `None` writes nothing.
+    pub out: Option<PathBuf>,
+    /// Pictures per second of weather time; at least 1. Without a renderer there are none.
+    pub fps: u32,
+    /// Size of the pictures in pixels, up to [`Self::MAX_SIZE`] each way.
+    pub size: UVec2,
+    /// In place of the scenario's length.
+    pub seconds: Option<f32>,
+    /// In place of the scenario's seed.
+    pub seed: Option<u64>,
+    /// Threads to compute with; all cores if `None`. The first replay of a process decides for all that follow.
+    pub threads: Option<usize>,
+    /// Draw pictures.
+    pub render: bool,
+}
+
+impl ReplayOptions {
+    /// The widest and highest picture.
+    pub const MAX_SIZE: u32 = 8192;
+
+    /// A run of `scenario` that draws small pictures at 24 a second.
+    pub fn new(scenario: LoadedScenario) -> Self {
+        Self {
+            scenario,
+            out: None,
+            fps: 24,
+            size: UVec2::new(640, 360),
+            seconds: None,
+            seed: None,
+            threads: None,
+            render: true,
+        }
+    }
+}
+
+/// Why a replay did not finish.
+#[derive(thiserror::Error, Debug)]
+#[non_exhaustive]
+pub enum ReplayError {
+    /// The scenario, or something it names, cannot be used.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// An option is out of range.
+    #[error("option `{option}` is {value}, but must be {expected}")]
+    Option {
+        /// Its name.
+        option: &'static str,
+        /// What it is.
+        value: String,
+        /// What it must be.
+        expected: String,
+    },
+    /// No graphics driver.
+    #[error(
+        "no graphics adapter found; install a Vulkan driver (Debian/Ubuntu: mesa-vulkan-drivers has one that needs \
+         no GPU), or run with --no-render"
+    )]
+    NoAdapter,
+    /// A file could not be written.
+    #[error("cannot write {}: {source}", .path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A picture could not be encoded.
+    #[error("cannot encode {}: {source}", .path.display())]
+    Encode {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: image::ImageError,
+    },
+    /// The renderer did not answer.
+    #[error("gave up after {seconds} s waiting for {what}")]
+    TimedOut {
+        /// What did not come.
+        what: &'static str,
+        /// How long it was waited for.
+        seconds: u64,
+    },
+    /// The report could not be written as JSON.
+    #[error("cannot write the report: {0}")]
+    Report(#[from] serde_json::Error),
+}
+
+/// How far a replay is: ticks done, of all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Progress {
+    /// Ticks done.
+    pub tick: u32,
+    /// Ticks in all.
+    pub ticks: u32,
+}
+
+/// Seconds of wall-clock time after which loading or reading back is given up.
+const PATIENCE_SECONDS: u64 = 300;
+
+/// Runs a scenario from beginning to end.
+///
+/// # Errors
+/// [`ReplayError`]; then nothing half-written is left, though pictures that were finished before stay.
+pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Result<Report, ReplayError> {
+    let begun = Instant::now();
+    options.check()?;
+    let mut run = Run::load(options)?;
+    let loaded = begun.elapsed();
+
+    let clock = *run.app.world().resource::<WeatheringClock>();
+    let seconds = options.seconds.unwrap_or(options.scenario.scenario.seconds);
+    let ticks = (f64::from(seconds) * f64::from(clock.hz())).round() as u32;
+    let frames = if options.render {
+        (u64::from(ticks) * u64::from(options.fps)).div_ceil(u64::from(clock.hz())) as u32
+    } else {
+        0
+    };
+    let mut tick = 0;
+    for frame in 0..frames {
+        let due = (u64::from(frame) * u64::from(clock.hz()) / u64::from(options.fps)) as u32;
+        run.capture(frame)?;
+        run.step(due - tick)?;
+        tick = due;
+        progress(Progress { tick, ticks });
+    }
+    while tick < ticks {
+        // Without pictures: a quarter of a second at a time, so that progress can be told.
+        let step = (clock.hz() / 4).clamp(1, ticks - tick);
+        run.step(step)?;
+        tick += step;
+        progress(Progress { tick, ticks });
+    }
+    run.finish_captures()?;
+    let simulated = begun.elapsed() - loaded;
+
+    let maps = run.read_maps()?;
+    let timing = Timing {
+        load_seconds: loaded.as_secs_f64(),
+        run_seconds: simulated.as_secs_f64(),
+        total_seconds: begun.elapsed().as_secs_f64(),
+        frames,
+    };
+    let report = report::report(run.app.world_mut(), options, &maps, timing);
+    if let Some(out) = &options.out {
+        maps::write_maps(&out.join("maps"), &maps)?;
+        write_atomic(&out.join("report.json"), &serde_json::to_vec_pretty(&report)?)?;
+    }
+    Ok(report)
+}
+
+impl ReplayOptions {
+    fn check(&self) -> Result<(), ReplayError> {
+        let wrong =
+            |option, value: String, expected: String| Err(ReplayError::Option { option, value, expected });
+        if self.fps == 0 || self.fps > WeatheringClock::MAX_HZ {
+            return wrong("fps", self.fps.to_string(), format!("1 to {}", WeatheringClock::MAX_HZ));
+        }
+        if self.size.min_element() == 0 || self.size.max_element() > Self::MAX_SIZE {
+            let value = format!("{}x{}", self.size.x, self.size.y);
+            return wrong("size", value, format!("1x1 to {0}x{0}", Self::MAX_SIZE));
+        }
+        let most = crate::scenario::Scenario::MAX_SECONDS;
+        if let Some(seconds) = self.seconds
+            && !(seconds > 0.0 && seconds <= most)
+        {
+            return wrong("seconds", seconds.to_string(), format!("above 0 and at most {most}"));
+        }
+        if self.threads == Some(0) {
+            return wrong("threads", "0".into(), "at least 1".into());
+        }
+        Ok(())
+    }
+}
+
+/// A replay under way.
+struct Run<'a> {
+    options: &'a ReplayOptions,
+    app: App,
+    target: Option<Handle<Image>>,
+}
+
+impl<'a> Run<'a> {
+    /// Builds the app and waits until the scene is there.
+    fn load(options: &'a ReplayOptions) -> Result<Self, ReplayError> {
+        if options.render {
+            require_adapter()?;
+        }
+        let mut scenario = ScenarioPlugin::new(options.scenario.clone(), options.render)?;
+        scenario.seed = options.seed;
+        let mut app = app::build(options, scenario);
+        let target = options.render.then(|| capture::add_target(app.world_mut(), options.size));
+        let mut run = Self { options, app, target };
+        let begun = Instant::now();
+        loop {
+            run.step(0)?;
+            match run.app.world_mut().resource_mut::<ScenarioStatus>().as_mut() {
+                ScenarioStatus::Ready => break,
+                ScenarioStatus::Loading => {}
+                failed => {
+                    if let ScenarioStatus::Failed(error) = std::mem::take(failed) {
+                        return Err(error.into());
+                    }
+                }
+            }
+            give_up_after(begun, "the scene to load")?;
+            // Loading goes on in other threads.
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        // Materials are exchanged and drawn in the frames after; the first picture must not miss them.
+        for _ in 0..3 {
+            run.step(0)?;
+        }
+        Ok(run)
+    }
+
+    /// One frame that holds `ticks` ticks.
+    fn step(&mut self, ticks: u32) -> Result<(), ReplayError> {
+        self.app.insert_resource(TimeUpdateStrategy::FixedTimesteps(ticks));
+        self.app.update();
+        if self.options.render {
+            app::wait_for_gpu(self.app.world());
+        }
+        self.write_captures()
+    }
+}
+
+fn give_up_after(begun: Instant, what: &'static str) -> Result<(), ReplayError> {
+    if begun.elapsed().as_secs() < PATIENCE_SECONDS {
+        return Ok(());
+    }
+    Err(ReplayError::TimedOut { what, seconds: PATIENCE_SECONDS })
+}

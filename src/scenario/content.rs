@@ -1,0 +1,135 @@
+//! The files and generated data a scenario is made of. Everything is loaded before the first tick.
+
+use bevy::asset::RenderAssetUsages;
+use bevy::image::{CompressedImageFormats, ImageSampler, ImageType};
+use bevy::math::Affine2;
+use bevy::prelude::*;
+
+use super::{LoadedScenario, MaterialSpec, MeshSpec, ScenarioError, TextureSpec};
+use crate::effect::WeatherEffect;
+use crate::scenes::environment::{
+    EnvironmentMaps, EnvironmentSettings, environment_maps_from_equirect, load_equirect,
+};
+use crate::scenes::meshes::{self, MeshError};
+use crate::scenes::mips::{MipContent, tiling_sampler, with_mips};
+use crate::scenes::stone::stone_maps;
+
+/// Everything but meshes from files, which Bevy's asset server loads.
+pub(super) struct Content {
+    /// In the order of the emitters.
+    pub(super) effects: Vec<WeatherEffect>,
+    /// In the order of the surfaces; `None` for files.
+    pub(super) meshes: Vec<Option<Mesh>>,
+    /// In the order of the materials; empty without a renderer.
+    pub(super) materials: Vec<MaterialMaps>,
+    /// `None` without a renderer.
+    pub(super) environment: Option<EnvironmentMaps>,
+}
+
+/// The maps of a material.
+#[derive(Default)]
+pub(super) struct MaterialMaps {
+    pub(super) albedo: Option<Image>,
+    pub(super) normal: Option<Image>,
+    pub(super) roughness: Option<Image>,
+}
+
+impl LoadedScenario {
+    /// Loads and generates; without `looks` only what a run without a renderer needs.
+    pub(super) fn content(&self, looks: bool) -> Result<Content, ScenarioError> {
+        let scenario = &self.scenario;
+        let mut effects = Vec::new();
+        for (index, emitter) in scenario.emitters.iter().enumerate() {
+            let field = format!("emitters[{index}].effect");
+            let path = self.resolve(&field, &emitter.effect)?;
+            let bytes = std::fs::read(path).map_err(|e| self.content_error(&field, &emitter.effect, e))?;
+            let effect = WeatherEffect::from_ron(&bytes);
+            effects.push(effect.map_err(|e| self.content_error(&field, &emitter.effect, e))?);
+        }
+        let mut meshes = Vec::new();
+        for (index, surface) in scenario.surfaces.iter().enumerate() {
+            let mesh = generate(&surface.mesh);
+            let unusable = |e| self.content_error(&format!("surfaces[{index}].mesh"), &surface.name, e);
+            meshes.push(mesh.transpose().map_err(unusable)?);
+        }
+        let mut materials = Vec::new();
+        let mut environment = None;
+        if looks {
+            for (name, material) in &scenario.materials {
+                materials.push(self.material_maps(&format!("materials.{name}.texture"), material)?);
+            }
+            if let Some(spec) = &scenario.environment {
+                let path = self.resolve("environment.map", &spec.map)?;
+                let unusable = |e| self.content_error("environment.map", &spec.map, e);
+                let (width, height, pixels) = load_equirect(&path).map_err(unusable)?;
+                let settings = EnvironmentSettings::default();
+                environment =
+                    Some(environment_maps_from_equirect(width, height, &pixels, settings).map_err(unusable)?);
+            }
+        }
+        Ok(Content { effects, meshes, materials, environment })
+    }
+
+    fn material_maps(&self, field: &str, material: &MaterialSpec) -> Result<MaterialMaps, ScenarioError> {
+        match &material.texture {
+            TextureSpec::Plain => Ok(MaterialMaps::default()),
+            TextureSpec::Photo(photo) => {
+                let path = self.resolve(field, photo)?;
+                let bytes = std::fs::read(&path).map_err(|e| self.content_error(field, photo, e))?;
+                let image = Image::from_buffer(
+                    &bytes,
+                    ImageType::Extension("png"),
+                    CompressedImageFormats::NONE,
+                    true,
+                    ImageSampler::Default,
+                    RenderAssetUsages::default(),
+                );
+                let image = image.map_err(|e| self.content_error(field, photo, e))?;
+                let mut image =
+                    with_mips(image, MipContent::Values).map_err(|e| self.content_error(field, photo, e))?;
+                image.sampler = tiling_sampler();
+                image.asset_usage = RenderAssetUsages::RENDER_WORLD;
+                Ok(MaterialMaps { albedo: Some(image), ..default() })
+            }
+            &TextureSpec::Stone { kind, size, seed } => {
+                let maps = stone_maps(kind, size, seed);
+                Ok(MaterialMaps {
+                    albedo: Some(maps.albedo),
+                    normal: Some(maps.normal),
+                    roughness: Some(maps.roughness),
+                })
+            }
+        }
+    }
+}
+
+fn generate(mesh: &MeshSpec) -> Option<Result<Mesh, MeshError>> {
+    match *mesh {
+        MeshSpec::Ground { size, cells } => Some(meshes::ground(size, cells)),
+        MeshSpec::Sphere { radius, sectors, stacks } => Some(meshes::uv_sphere(radius, sectors, stacks)),
+        MeshSpec::Vase { height, segments, rings } => Some(meshes::vase(height, segments, rings)),
+        MeshSpec::File(_) => None,
+    }
+}
+
+impl MaterialMaps {
+    /// The material with its maps.
+    pub(super) fn into_material(self, spec: &MaterialSpec, images: &mut Assets<Image>) -> StandardMaterial {
+        let mut add = |image: Option<Image>| image.map(|image| images.add(image));
+        // Its red channel is the ambient occlusion.
+        let roughness = add(self.roughness);
+        let [red, green, blue] = spec.color;
+        StandardMaterial {
+            base_color: Color::linear_rgb(red, green, blue),
+            base_color_texture: add(self.albedo),
+            normal_map_texture: add(self.normal),
+            metallic_roughness_texture: roughness.clone(),
+            occlusion_texture: roughness,
+            perceptual_roughness: spec.roughness,
+            reflectance: spec.reflectance,
+            metallic: spec.metallic,
+            uv_transform: Affine2::from_scale(spec.tiles),
+            ..default()
+        }
+    }
+}

@@ -1,0 +1,313 @@
+//! What a scenario file may say. Every struct refuses fields it does not know.
+
+use std::collections::BTreeMap;
+
+use bevy::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::emitter::EmitterShape;
+use crate::material::PorousMaterial;
+use crate::overlay::Weatherable;
+use crate::scenes::stone::Stone;
+
+/// A scene and what happens in it. Lengths in metres, angles in degrees, time in seconds.
+#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// Seeds everything random.
+    #[serde(default)]
+    pub seed: u64,
+    /// Ticks per second, 1..=1000.
+    #[serde(default = "default_hz")]
+    pub tick_hz: u32,
+    /// Length, up to [`Self::MAX_SECONDS`].
+    pub seconds: f32,
+    /// m/s².
+    #[serde(default = "default_gravity")]
+    pub gravity: Vec3,
+    /// m/s.
+    #[serde(default)]
+    pub wind: Vec3,
+    /// The most particles in flight, up to [`Self::MAX_PARTICLES`].
+    #[serde(default = "default_max_particles")]
+    pub max_particles: u32,
+    /// Where it is seen from.
+    pub camera: CameraSpec,
+    /// The one light with shadows.
+    #[serde(default)]
+    pub sun: SunSpec,
+    /// What is all around.
+    #[serde(default)]
+    pub environment: Option<EnvironmentSpec>,
+    /// Materials by name.
+    pub materials: BTreeMap<String, MaterialSpec>,
+    /// What can get wet, at most [`Self::MAX_SURFACES`].
+    pub surfaces: Vec<SurfaceSpec>,
+    /// What makes it wet.
+    #[serde(default)]
+    pub emitters: Vec<EmitterSpec>,
+}
+
+impl Scenario {
+    /// The longest run: a day.
+    pub const MAX_SECONDS: f32 = 86_400.0;
+    /// The most particles in flight.
+    pub const MAX_PARTICLES: u32 = 10_000_000;
+    /// The most surfaces.
+    pub const MAX_SURFACES: usize = 10_000;
+    /// The most particles an emitter sends per second.
+    pub const MAX_RATE: f32 = 10_000_000.0;
+    /// The most triangles of a generated mesh.
+    pub const MAX_TRIANGLES: u64 = 20_000_000;
+}
+
+fn default_hz() -> u32 {
+    crate::clock::WeatheringClock::DEFAULT_HZ
+}
+
+fn default_gravity() -> Vec3 {
+    crate::particle::Forces::default().gravity
+}
+
+fn default_max_particles() -> u32 {
+    crate::particle::ParticleConfig::default().max_alive
+}
+
+/// A camera that moves along its keys.
+#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct CameraSpec {
+    /// Vertical field of view.
+    #[serde(default = "default_fov")]
+    pub fov_deg: f32,
+    /// In order of time; one is enough. Smooth in between.
+    pub keys: Vec<CameraKey>,
+}
+
+fn default_fov() -> f32 {
+    40.0
+}
+
+/// Where the camera is at a time.
+#[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct CameraKey {
+    /// Seconds.
+    #[serde(default)]
+    pub t: f32,
+    /// Position of the eye.
+    pub eye: Vec3,
+    /// What it looks at.
+    pub target: Vec3,
+}
+
+/// The sun.
+#[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct SunSpec {
+    /// Where it shines to.
+    pub direction: Vec3,
+    /// Lux.
+    pub illuminance: f32,
+    /// Linear RGB.
+    pub color: [f32; 3],
+    /// Casts shadows.
+    pub shadows: bool,
+}
+
+impl Default for SunSpec {
+    fn default() -> Self {
+        Self {
+            direction: Vec3::new(-0.5, -1.0, -0.4),
+            illuminance: 8_000.0,
+            color: [1.0, 0.95, 0.88],
+            shadows: true,
+        }
+    }
+}
+
+/// A photograph of everything around.
+#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct EnvironmentSpec {
+    /// Equirectangular `.exr`.
+    pub map: String,
+    /// cd/m² of a texel of value 1.
+    #[serde(default = "default_intensity")]
+    pub intensity: f32,
+    /// Turns the map around the vertical axis.
+    #[serde(default)]
+    pub turn_deg: f32,
+    /// Shows it behind the scene.
+    #[serde(default = "default_true")]
+    pub skybox: bool,
+}
+
+fn default_intensity() -> f32 {
+    1_500.0
+}
+
+fn default_true() -> bool {
+    true
+}
+
+/// How a surface looks dry and takes up water.
+#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct MaterialSpec {
+    /// Linear RGB; multiplies the texture.
+    pub color: [f32; 3],
+    /// Colour, normal and roughness maps.
+    pub texture: TextureSpec,
+    /// Repeats of the texture over the uv square.
+    pub tiles: Vec2,
+    /// Perceptual roughness; multiplies the texture's.
+    pub roughness: f32,
+    /// Bevy's reflectance: F0 = 0.16 reflectance².
+    pub reflectance: f32,
+    /// Metal: takes up no water.
+    pub metallic: f32,
+    /// How it gets wet.
+    pub porous: PorousMaterial,
+}
+
+impl Default for MaterialSpec {
+    fn default() -> Self {
+        Self {
+            color: [1.0; 3],
+            texture: TextureSpec::Plain,
+            tiles: Vec2::ONE,
+            roughness: 0.9,
+            reflectance: 0.5,
+            metallic: 0.0,
+            porous: PorousMaterial::default(),
+        }
+    }
+}
+
+/// Where the maps of a material come from.
+#[derive(Serialize, Deserialize, Debug, Clone, PartialEq, Default)]
+pub enum TextureSpec {
+    /// No maps.
+    #[default]
+    Plain,
+    /// A colour photograph, `.png`.
+    Photo(String),
+    /// Generated colour, normal and roughness.
+    Stone {
+        /// Which stone.
+        kind: Stone,
+        /// Texels along each side.
+        size: u32,
+        /// Another piece of the same stone.
+        seed: u32,
+    },
+}
+
+/// A mesh that can get wet.
+#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct SurfaceSpec {
+    /// Unique; names its maps and its row in the report.
+    pub name: String,
+    /// Its shape.
+    pub mesh: MeshSpec,
+    /// Name of its material.
+    pub material: String,
+    /// Position of its origin.
+    #[serde(default)]
+    pub position: Vec3,
+    /// Turns around Y, then X, then Z.
+    #[serde(default)]
+    pub rotation_deg: Vec3,
+    /// Per axis, not 0.
+    #[serde(default = "default_scale")]
+    pub scale: Vec3,
+    /// Its maps.
+    #[serde(default)]
+    pub maps: Weatherable,
+}
+
+fn default_scale() -> Vec3 {
+    Vec3::ONE
+}
+
+/// Where a mesh comes from.
+#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+pub enum MeshSpec {
+    /// A horizontal grid: 2 · cells.x · cells.y triangles.
+    Ground {
+        /// Along x and z.
+        size: Vec2,
+        /// Along x and z.
+        cells: UVec2,
+    },
+    /// Sectors around, stacks from pole to pole.
+    Sphere {
+        /// Metres.
+        radius: f32,
+        /// At least 3.
+        sectors: u32,
+        /// At least 2.
+        stacks: u32,
+    },
+    /// A turned vase: 2 · segments · rings triangles.
+    Vase {
+        /// Metres.
+        height: f32,
+        /// Around.
+        segments: u32,
+        /// Along the profile.
+        rings: u32,
+    },
+    /// The first mesh of a `.glb` or `.gltf`.
+    File(String),
+}
+
+/// An emitter that moves along its keys.
+#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct EmitterSpec {
+    /// For messages.
+    pub name: String,
+    /// `.effect.ron`.
+    pub effect: String,
+    /// Particles per second.
+    pub rate: f32,
+    /// Where on it they start.
+    #[serde(default)]
+    pub shape: EmitterShape,
+    /// m/s.
+    pub speed: f32,
+    /// Half-angle of the cone of directions.
+    #[serde(default)]
+    pub spread_deg: f32,
+    /// Seconds until a particle that hits nothing is removed.
+    #[serde(default = "default_lifetime")]
+    pub lifetime: f32,
+    /// Seconds at which it starts.
+    #[serde(default)]
+    pub start: f32,
+    /// Seconds at which it stops; the end of the run if left out.
+    #[serde(default)]
+    pub stop: Option<f32>,
+    /// In order of time; one is enough. Linear in between.
+    pub keys: Vec<EmitterKey>,
+}
+
+fn default_lifetime() -> f32 {
+    5.0
+}
+
+/// Where an emitter is at a time.
+#[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct EmitterKey {
+    /// Seconds.
+    #[serde(default)]
+    pub t: f32,
+    /// Its position.
+    pub position: Vec3,
+    /// What it aims at.
+    pub target: Vec3,
+}

@@ -1,0 +1,249 @@
+//! Building the scene, and waiting until all of it is there.
+
+use bevy::asset::LoadState;
+use bevy::gltf::GltfAssetLabel;
+use bevy::light::{CascadeShadowConfigBuilder, EnvironmentMapLight, Skybox};
+use bevy::prelude::*;
+use bevy::render::RenderApp;
+
+use super::content::Content;
+use super::motion::{EmitterMotion, ScenarioCamera, move_camera, move_emitters};
+use super::{Digest, LoadedScenario, MeshSpec, ScenarioError, digest};
+use crate::clock::{ClockPlugin, WeatheringClock};
+use crate::collision::{MeshColliders, NotWeatherable, SurfaceCollider};
+use crate::effect::{EffectTable, WeatherEffect};
+use crate::emitter::{EmissionSeed, Emitter};
+use crate::overlay::TexelAreas;
+use crate::particle::{Forces, ParticleConfig};
+use crate::schedule::WeatheringSystems;
+
+/// Spawns a scenario and runs it once everything is loaded. Virtual time stands still until then.
+///
+/// Sets the tick rate, so add it after [`WeatheringPlugins`](crate::WeatheringPlugins).
+pub struct ScenarioPlugin {
+    content: std::sync::Mutex<Option<Content>>,
+    scenario: LoadedScenario,
+    /// In place of the scenario's own.
+    pub seed: Option<u64>,
+}
+
+impl ScenarioPlugin {
+    /// Loads what the scenario names. `looks` is false for runs without a renderer.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Content`] for files that cannot be used.
+    pub fn new(scenario: LoadedScenario, looks: bool) -> Result<Self, ScenarioError> {
+        let content = std::sync::Mutex::new(Some(scenario.content(looks)?));
+        Ok(Self { content, scenario, seed: None })
+    }
+}
+
+/// The running scenario.
+#[derive(Resource, Debug, Clone)]
+struct CurrentScenario(LoadedScenario);
+
+/// How far the scenario is.
+#[derive(Resource, Debug, Default)]
+pub enum ScenarioStatus {
+    /// Meshes are being loaded and their BVHs built.
+    #[default]
+    Loading,
+    /// Time runs.
+    Ready,
+    /// Something that the scenario names cannot be used.
+    Failed(ScenarioError),
+}
+
+/// A surface of the scenario.
+#[derive(Component, Debug, Clone)]
+pub struct ScenarioSurface {
+    /// Its number in the scenario.
+    pub index: u32,
+    /// Its name there.
+    pub name: String,
+}
+
+impl Plugin for ScenarioPlugin {
+    fn build(&self, app: &mut App) {
+        let scenario = &self.scenario.scenario;
+        ClockPlugin { hz: scenario.tick_hz }.insert_clock(app);
+        app.insert_resource(EmissionSeed(self.seed.unwrap_or(scenario.seed)))
+            .insert_resource(Forces { gravity: scenario.gravity, wind: scenario.wind })
+            .insert_resource(ParticleConfig { max_alive: scenario.max_particles })
+            .insert_resource(CurrentScenario(self.scenario.clone()))
+            .init_resource::<ScenarioStatus>()
+            .init_resource::<Digest>()
+            .add_systems(PreUpdate, watch_loading.run_if(is_loading))
+            .add_systems(
+                FixedUpdate,
+                (
+                    // Emitters stand where they should before they emit.
+                    move_emitters.in_set(WeatheringSystems::First),
+                    digest::digest_impacts.in_set(WeatheringSystems::Last),
+                ),
+            )
+            .add_systems(Update, move_camera);
+        app.world_mut().resource_mut::<Time<Virtual>>().pause();
+
+        let content = self.content.lock().ok().and_then(|mut content| content.take());
+        let Some(content) = content else { return };
+        let looks = app.get_sub_app(RenderApp).is_some();
+        spawn_scene(app.world_mut(), &self.scenario, content, looks);
+    }
+}
+
+fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, looks: bool) {
+    let scenario = &loaded.scenario;
+    for (index, (spec, effect)) in scenario.emitters.iter().zip(content.effects).enumerate() {
+        let handle = world.resource_mut::<Assets<WeatherEffect>>().add(effect.clone());
+        world.resource_mut::<EffectTable>().insert(handle.clone(), effect);
+        world.spawn((
+            Name::new(spec.name.clone()),
+            Emitter {
+                effect: handle,
+                rate: spec.rate,
+                shape: spec.shape,
+                speed: spec.speed,
+                spread: spec.spread_deg.to_radians(),
+                lifetime: spec.lifetime,
+                stream: index as u32,
+                enabled: false,
+            },
+            EmitterMotion {
+                keys: spec.keys.clone(),
+                start: spec.start,
+                stop: spec.stop.unwrap_or(scenario.seconds),
+            },
+        ));
+    }
+    let mut materials = Vec::new();
+    if looks {
+        for ((name, spec), maps) in scenario.materials.iter().zip(content.materials) {
+            let material = maps.into_material(spec, &mut world.resource_mut::<Assets<Image>>());
+            let handle = world.resource_mut::<Assets<StandardMaterial>>().add(material);
+            materials.push((name, handle));
+        }
+    }
+    for (index, (spec, mesh)) in scenario.surfaces.iter().zip(content.meshes).enumerate() {
+        let mesh = match (&spec.mesh, mesh) {
+            (MeshSpec::File(path), _) => {
+                let label = GltfAssetLabel::Primitive { mesh: 0, primitive: 0 };
+                world.resource::<AssetServer>().load(label.from_asset(path.clone()))
+            }
+            (_, Some(mesh)) => world.resource_mut::<Assets<Mesh>>().add(mesh),
+            (_, None) => continue,
+        };
+        let turn = spec.rotation_deg.map(f32::to_radians);
+        let transform = Transform {
+            translation: spec.position,
+            rotation: Quat::from_euler(EulerRot::YXZ, turn.y, turn.x, turn.z),
+            scale: spec.scale,
+        };
+        let surface = ScenarioSurface { index: index as u32, name: spec.name.clone() };
+        let mut entity = world.spawn((
+            Name::new(spec.name.clone()),
+            surface,
+            spec.maps,
+            Mesh3d(mesh),
+            transform,
+            GlobalTransform::from(transform),
+        ));
+        if let Some(material) = scenario.materials.get(&spec.material) {
+            entity.insert(material.porous);
+        }
+        if let Some((_, material)) = materials.iter().find(|(name, _)| **name == spec.material) {
+            entity.insert(MeshMaterial3d(material.clone()));
+        }
+    }
+    if looks {
+        spawn_view(world, loaded, content.environment);
+    }
+}
+
+fn spawn_view(
+    world: &mut World,
+    loaded: &LoadedScenario,
+    maps: Option<crate::scenes::environment::EnvironmentMaps>,
+) {
+    let scenario = &loaded.scenario;
+    let [red, green, blue] = scenario.sun.color;
+    world.spawn((
+        Name::new("sun"),
+        DirectionalLight {
+            illuminance: scenario.sun.illuminance,
+            color: Color::linear_rgb(red, green, blue),
+            shadow_maps_enabled: scenario.sun.shadows,
+            ..default()
+        },
+        CascadeShadowConfigBuilder { maximum_distance: 40.0, first_cascade_far_bound: 6.0, ..default() }
+            .build(),
+        Transform::default().looking_to(scenario.sun.direction, Vec3::Y),
+    ));
+    let mut camera = world.spawn((
+        Name::new("camera"),
+        Camera3d::default(),
+        Msaa::Sample4,
+        Projection::from(PerspectiveProjection { fov: scenario.camera.fov_deg.to_radians(), ..default() }),
+        ScenarioCamera { keys: scenario.camera.keys.clone() },
+    ));
+    let (Some(maps), Some(spec)) = (maps, &scenario.environment) else { return };
+    let rotation = Quat::from_rotation_y(spec.turn_deg.to_radians());
+    let camera_id = camera.id();
+    camera.insert(Transform::default());
+    let mut images = world.resource_mut::<Assets<Image>>();
+    let light = EnvironmentMapLight {
+        diffuse_map: images.add(maps.diffuse),
+        specular_map: images.add(maps.specular),
+        intensity: spec.intensity,
+        rotation,
+        ..default()
+    };
+    let skybox = Skybox { image: Some(images.add(maps.skybox)), brightness: spec.intensity, rotation };
+    let mut camera = world.entity_mut(camera_id);
+    camera.insert(light);
+    if spec.skybox {
+        camera.insert(skybox);
+    }
+}
+
+fn is_loading(status: Res<ScenarioStatus>) -> bool {
+    matches!(*status, ScenarioStatus::Loading)
+}
+
+/// Lets time run when every surface can be hit, or says which cannot.
+fn watch_loading(
+    current: Res<CurrentScenario>,
+    assets: Res<AssetServer>,
+    colliders: Res<MeshColliders>,
+    surfaces: Query<(&ScenarioSurface, &Mesh3d, Option<&NotWeatherable>)>,
+    unfinished: Query<(), (With<ScenarioSurface>, Or<(Without<SurfaceCollider>, Without<TexelAreas>)>)>,
+    mut status: ResMut<ScenarioStatus>,
+    mut time: ResMut<Time<Virtual>>,
+) {
+    for (surface, mesh, refused) in &surfaces {
+        let reason = match (refused, assets.get_load_state(&mesh.0)) {
+            (Some(NotWeatherable(error)), _) => error.to_string(),
+            (None, Some(LoadState::Failed(error))) => error.to_string(),
+            _ => continue,
+        };
+        let field = format!("surfaces[{}].mesh", surface.index);
+        let value = match &current.0.scenario.surfaces[surface.index as usize].mesh {
+            MeshSpec::File(path) => path.as_str(),
+            _ => surface.name.as_str(),
+        };
+        *status = ScenarioStatus::Failed(current.0.content_error(&field, value, reason));
+        return;
+    }
+    if unfinished.is_empty() && colliders.building() == 0 {
+        *status = ScenarioStatus::Ready;
+        time.unpause();
+    }
+}
+
+impl ClockPlugin {
+    /// Sets the clock of an app that has the plugin already.
+    fn insert_clock(&self, app: &mut App) {
+        let clock = WeatheringClock::new(self.hz);
+        app.insert_resource(Time::<Fixed>::from_hz(f64::from(clock.hz()))).insert_resource(clock);
+    }
+}

@@ -1,0 +1,256 @@
+//! Checking every value, and naming the first that is wrong.
+
+use std::collections::BTreeSet;
+use std::fmt::Display;
+
+use bevy::math::{Vec2, Vec3};
+
+use super::{
+    EmitterSpec, LoadedScenario, MaterialSpec, MeshSpec, Scenario, ScenarioError, SurfaceSpec, TextureSpec,
+};
+use crate::clock::WeatheringClock;
+use crate::emitter::EmitterShape;
+use crate::overlay::{TILE_SIZE, Weatherable};
+
+/// The farthest coordinate: beyond it an f32 is coarser than a drop.
+const FAR: f32 = 1.0e5;
+
+impl LoadedScenario {
+    /// Checks every value and that every named file exists.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] for the first thing wrong.
+    pub(super) fn validate(&self) -> Result<(), ScenarioError> {
+        let scenario = &self.scenario;
+        self.range("tick_hz", f64::from(scenario.tick_hz), 1.0, f64::from(WeatheringClock::MAX_HZ))?;
+        self.positive("seconds", scenario.seconds, Scenario::MAX_SECONDS)?;
+        self.vector("gravity", scenario.gravity, 1000.0)?;
+        self.vector("wind", scenario.wind, 1000.0)?;
+        let most = f64::from(Scenario::MAX_PARTICLES);
+        self.range("max_particles", f64::from(scenario.max_particles), 1.0, most)?;
+        self.validate_view()?;
+        for (name, material) in &scenario.materials {
+            self.validate_material(&format!("materials.{name}"), material)?;
+        }
+        if scenario.surfaces.len() > Scenario::MAX_SURFACES {
+            let expected = format!("at most {} (MAX_SURFACES)", Scenario::MAX_SURFACES);
+            return Err(self.value("surfaces", scenario.surfaces.len(), expected));
+        }
+        let mut names = BTreeSet::new();
+        for (index, surface) in scenario.surfaces.iter().enumerate() {
+            let field = format!("surfaces[{index}]");
+            self.validate_surface(&field, surface)?;
+            if !names.insert(&surface.name) {
+                return Err(self.value(format!("{field}.name"), &surface.name, "unique"));
+            }
+        }
+        for (index, emitter) in scenario.emitters.iter().enumerate() {
+            self.validate_emitter(&format!("emitters[{index}]"), emitter)?;
+        }
+        Ok(())
+    }
+
+    fn validate_view(&self) -> Result<(), ScenarioError> {
+        let Scenario { camera, sun, environment, .. } = &self.scenario;
+        self.range("camera.fov_deg", f64::from(camera.fov_deg), 1.0, 170.0)?;
+        self.times("camera.keys", camera.keys.iter().map(|key| key.t))?;
+        for (index, key) in camera.keys.iter().enumerate() {
+            self.look(&format!("camera.keys[{index}]"), "eye", key.eye, key.target)?;
+        }
+        self.vector("sun.direction", sun.direction, FAR)?;
+        if sun.direction.length() < 1.0e-6 {
+            return Err(self.value("sun.direction", sun.direction, "longer than 0"));
+        }
+        self.not_negative("sun.illuminance", sun.illuminance, 1.0e6)?;
+        self.color("sun.color", sun.color)?;
+        if let Some(environment) = environment {
+            self.resolve("environment.map", &environment.map)?;
+            self.not_negative("environment.intensity", environment.intensity, 1.0e6)?;
+            self.range("environment.turn_deg", f64::from(environment.turn_deg), -3600.0, 3600.0)?;
+        }
+        Ok(())
+    }
+
+    fn validate_material(&self, field: &str, material: &MaterialSpec) -> Result<(), ScenarioError> {
+        let porous = &material.porous;
+        self.color(&format!("{field}.color"), material.color)?;
+        for (name, value) in [
+            ("roughness", material.roughness),
+            ("reflectance", material.reflectance),
+            ("metallic", material.metallic),
+            ("porous.alpha_poro", porous.alpha_poro),
+            ("porous.s_p", porous.s_p),
+            ("porous.m", porous.m),
+            ("porous.k_w", porous.k_w),
+        ] {
+            self.not_negative(&format!("{field}.{name}"), value, 1.0)?;
+        }
+        self.not_negative(&format!("{field}.porous.t_fill"), porous.t_fill, Scenario::MAX_SECONDS)?;
+        self.positive(&format!("{field}.porous.capacity_mm"), porous.capacity_mm, 1000.0)?;
+        self.positive(&format!("{field}.tiles.x"), material.tiles.x, 1.0e4)?;
+        self.positive(&format!("{field}.tiles.y"), material.tiles.y, 1.0e4)?;
+        match &material.texture {
+            TextureSpec::Plain => {}
+            TextureSpec::Photo(path) => {
+                self.resolve(&format!("{field}.texture"), path)?;
+            }
+            TextureSpec::Stone { size, .. } => {
+                self.range(&format!("{field}.texture.size"), f64::from(*size), 16.0, 4096.0)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn validate_surface(&self, field: &str, surface: &SurfaceSpec) -> Result<(), ScenarioError> {
+        // It becomes part of file names.
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+        if surface.name.is_empty() || surface.name.len() > 64 || !surface.name.chars().all(plain) {
+            let expected = "1 to 64 letters, digits, `_` or `-`";
+            return Err(self.value(format!("{field}.name"), &surface.name, expected));
+        }
+        if !self.scenario.materials.contains_key(&surface.material) {
+            let expected = "the name of a material";
+            return Err(self.value(format!("{field}.material"), &surface.material, expected));
+        }
+        self.vector(&format!("{field}.position"), surface.position, FAR)?;
+        self.vector(&format!("{field}.rotation_deg"), surface.rotation_deg, 3600.0)?;
+        self.vector(&format!("{field}.scale"), surface.scale, FAR)?;
+        if surface.scale.abs().min_element() < 1.0e-6 {
+            return Err(self.value(format!("{field}.scale"), surface.scale, "at least 0.000001 per axis"));
+        }
+        let size = surface.maps.map_size;
+        if size != surface.maps.texels() {
+            let expected =
+                format!("a multiple of {TILE_SIZE} up to {} (MAX_MAP_SIZE)", Weatherable::MAX_MAP_SIZE);
+            return Err(self.value(format!("{field}.maps.map_size"), size, expected));
+        }
+        let triangles = match &surface.mesh {
+            MeshSpec::Ground { size, cells } => {
+                self.positive(&format!("{field}.mesh.size.x"), size.x, FAR)?;
+                self.positive(&format!("{field}.mesh.size.y"), size.y, FAR)?;
+                u64::from(cells.x) * u64::from(cells.y) * 2
+            }
+            MeshSpec::Sphere { radius, sectors, stacks } => {
+                self.positive(&format!("{field}.mesh.radius"), *radius, FAR)?;
+                u64::from(*sectors) * u64::from(*stacks) * 2
+            }
+            MeshSpec::Vase { height, segments, rings } => {
+                self.positive(&format!("{field}.mesh.height"), *height, FAR)?;
+                u64::from(*segments) * u64::from(*rings) * 2
+            }
+            MeshSpec::File(path) => return self.resolve(&format!("{field}.mesh"), path).map(drop),
+        };
+        if triangles == 0 || triangles > Scenario::MAX_TRIANGLES {
+            let expected = format!("1 to {} triangles (MAX_TRIANGLES)", Scenario::MAX_TRIANGLES);
+            return Err(self.value(format!("{field}.mesh"), format!("{triangles} triangles"), expected));
+        }
+        Ok(())
+    }
+
+    fn validate_emitter(&self, field: &str, emitter: &EmitterSpec) -> Result<(), ScenarioError> {
+        self.resolve(&format!("{field}.effect"), &emitter.effect)?;
+        self.not_negative(&format!("{field}.rate"), emitter.rate, Scenario::MAX_RATE)?;
+        self.not_negative(&format!("{field}.speed"), emitter.speed, 1000.0)?;
+        self.not_negative(&format!("{field}.spread_deg"), emitter.spread_deg, 180.0)?;
+        self.positive(&format!("{field}.lifetime"), emitter.lifetime, 3600.0)?;
+        self.not_negative(&format!("{field}.start"), emitter.start, Scenario::MAX_SECONDS)?;
+        if let Some(stop) = emitter.stop {
+            self.not_negative(&format!("{field}.stop"), stop, Scenario::MAX_SECONDS)?;
+        }
+        match emitter.shape {
+            EmitterShape::Point => {}
+            EmitterShape::Cone { radius } | EmitterShape::Disc { radius } => {
+                self.not_negative(&format!("{field}.shape.radius"), radius, FAR)?;
+            }
+            EmitterShape::Box { half_size } => {
+                self.vector(&format!("{field}.shape.half_size"), half_size, FAR)?;
+            }
+            EmitterShape::Sky { half_size: Vec2 { x, y } } => {
+                self.not_negative(&format!("{field}.shape.half_size.x"), x, FAR)?;
+                self.not_negative(&format!("{field}.shape.half_size.y"), y, FAR)?;
+            }
+        }
+        self.times(&format!("{field}.keys"), emitter.keys.iter().map(|key| key.t))?;
+        for (index, key) in emitter.keys.iter().enumerate() {
+            self.look(&format!("{field}.keys[{index}]"), "position", key.position, key.target)?;
+        }
+        Ok(())
+    }
+
+    /// At least one key, in order of time.
+    fn times(&self, field: &str, times: impl ExactSizeIterator<Item = f32>) -> Result<(), ScenarioError> {
+        if times.len() == 0 {
+            return Err(self.value(field, "empty", "at least one key"));
+        }
+        let mut before = 0.0;
+        for (index, t) in times.enumerate() {
+            let field = format!("{field}[{index}].t");
+            self.not_negative(&field, t, Scenario::MAX_SECONDS)?;
+            if t < before {
+                return Err(self.value(field, t, format!("{before} or later: keys are in order of time")));
+            }
+            before = t;
+        }
+        Ok(())
+    }
+
+    fn look(&self, field: &str, from: &str, eye: Vec3, target: Vec3) -> Result<(), ScenarioError> {
+        self.vector(&format!("{field}.{from}"), eye, FAR)?;
+        self.vector(&format!("{field}.target"), target, FAR)?;
+        if eye.distance(target) < 1.0e-6 {
+            return Err(self.value(
+                format!("{field}.target"),
+                target,
+                format!("another point than `{from}`"),
+            ));
+        }
+        Ok(())
+    }
+
+    fn color(&self, field: &str, color: [f32; 3]) -> Result<(), ScenarioError> {
+        color.into_iter().try_for_each(|channel| self.not_negative(field, channel, 1.0))
+    }
+
+    fn vector(&self, field: &str, vector: Vec3, most: f32) -> Result<(), ScenarioError> {
+        for (axis, value) in ["x", "y", "z"].into_iter().zip(vector.to_array()) {
+            self.range(&format!("{field}.{axis}"), f64::from(value), f64::from(-most), f64::from(most))?;
+        }
+        Ok(())
+    }
+
+    fn not_negative(&self, field: &str, value: f32, most: f32) -> Result<(), ScenarioError> {
+        self.range(field, f64::from(value), 0.0, f64::from(most))
+    }
+
+    fn positive(&self, field: &str, value: f32, most: f32) -> Result<(), ScenarioError> {
+        // Written so that NaN fails.
+        if value > 0.0 && value <= most {
+            Ok(())
+        } else {
+            Err(self.value(field, value, format!("above 0 and at most {most}")))
+        }
+    }
+
+    fn range(&self, field: &str, value: f64, least: f64, most: f64) -> Result<(), ScenarioError> {
+        // Written so that NaN fails.
+        if value >= least && value <= most {
+            Ok(())
+        } else {
+            Err(self.value(field, value, format!("{least} to {most}")))
+        }
+    }
+
+    fn value(
+        &self,
+        field: impl Into<String>,
+        value: impl Display,
+        expected: impl Into<String>,
+    ) -> ScenarioError {
+        ScenarioError::Value {
+            file: self.file.clone(),
+            field: field.into(),
+            value: value.to_string(),
+            expected: expected.into(),
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! The ingredients of a recipe: noise, grains, spots and scratches, all of which repeat over the tile.
+
+use bevy::math::{IVec2, Vec2};
+use fastnoise_lite::{FastNoiseLite, FractalType};
+
+use super::TILE_MM;
+
+/// Makes the ingredients of a recipe, each with its own random numbers.
+#[derive(Clone, Copy)]
+pub(super) struct Layers {
+    pub(super) seed: u32,
+    /// The most cells per tile that the texels can still show.
+    pub(super) finest: f32,
+}
+
+impl Layers {
+    /// Noise with `cycles` features per tile along u and v and `octaves` finer ones.
+    pub(super) fn noise(self, layer: u32, cycles: Vec2, octaves: i32) -> Noise {
+        let mut source = FastNoiseLite::with_seed(hash([self.seed, layer, 0]) as i32);
+        source.set_frequency(Some(1.0));
+        source.set_fractal_type(Some(FractalType::FBm));
+        source.set_fractal_octaves(Some(octaves));
+        Noise { source, cycles: cycles.min(Vec2::splat(self.finest)) }
+    }
+
+    /// `per_side * per_side` cells per tile.
+    pub(super) fn cells(self, layer: u32, per_side: f32) -> Cells {
+        Cells { per_side: per_side.min(self.finest).max(1.0) as i32, seed: hash([self.seed, layer, 1]) }
+    }
+
+    pub(super) fn scratches(self, layer: u32, count: u32) -> Scratches {
+        let scratch = |i: u32| {
+            let random = |j: u32| unit(hash([self.seed ^ layer, i, j]));
+            let angle = (random(0) - 0.5) * 2.4;
+            Scratch {
+                middle: Vec2::new(random(1), random(2)),
+                along: Vec2::from_angle(angle),
+                half_length: 0.02 + 0.16 * random(3) * random(4),
+                half_width: 0.0006 + 0.0008 * random(5),
+                strength: 0.3 + 0.7 * random(6),
+            }
+        };
+        Scratches((0..count).map(scratch).collect())
+    }
+}
+
+/// Fractal noise that repeats over the unit square, about -1 to 1; see [`super`] on tiling.
+/// Half a cycle per tile is the least: closer, noise resembles itself and gains contrast when exchanged.
+pub(super) struct Noise {
+    source: FastNoiseLite,
+    cycles: Vec2,
+}
+
+impl Noise {
+    pub(super) fn at(&self, uv: Vec2) -> f32 {
+        let uv = uv - uv.floor();
+        let late = Vec2::new(smoothstep(0.75, 1.0, uv.x), smoothstep(0.75, 1.0, uv.y));
+        let early = 1.0 - late;
+        let mut sum = 0.0;
+        for (shift, weight) in [
+            (Vec2::ZERO, early.x * early.y),
+            (Vec2::X, late.x * early.y),
+            (Vec2::Y, early.x * late.y),
+            (Vec2::ONE, late.x * late.y),
+        ] {
+            if weight > 0.0 {
+                let at = (uv - shift) * self.cycles;
+                sum += weight * self.source.get_noise_2d(at.x, at.y);
+            }
+        }
+        let variance = early * early + late * late;
+        sum / (variance.x * variance.y).sqrt()
+    }
+}
+
+/// Points scattered one to a cell over the unit square, repeating.
+pub(super) struct Cells {
+    per_side: i32,
+    seed: u32,
+}
+
+/// The point next to a place.
+pub(super) struct Grain {
+    /// Distances to the nearest point and to the one after it, in cells.
+    nearest: f32,
+    second: f32,
+    number: u32,
+}
+
+impl Grain {
+    /// A random number of the grain's own, `0..1`, one for each `which`.
+    pub(super) fn chance(&self, which: u32) -> f32 {
+        unit(hash([self.number, which, 2]))
+    }
+}
+
+impl Cells {
+    /// The points of the nine cells around a place: distance in cells, and number.
+    fn around(&self, uv: Vec2) -> impl Iterator<Item = (f32, u32)> {
+        let at = uv * self.per_side as f32;
+        let home = at.floor().as_ivec2();
+        let (per_side, seed) = (self.per_side, self.seed);
+        (0..9).map(move |i| {
+            let cell = home + IVec2::new(i % 3 - 1, i / 3 - 1);
+            let (x, y) = (cell.x.rem_euclid(per_side) as u32, cell.y.rem_euclid(per_side) as u32);
+            let number = hash([seed, x, y]);
+            let jitter = Vec2::new((number >> 16) as f32, (number & 0xffff) as f32) / 65536.0;
+            (at.distance(cell.as_vec2() + jitter), number)
+        })
+    }
+
+    pub(super) fn nearest(&self, uv: Vec2) -> Grain {
+        let mut grain = Grain { nearest: f32::MAX, second: f32::MAX, number: 0 };
+        for (distance, number) in self.around(uv) {
+            if distance < grain.nearest {
+                grain = Grain { nearest: distance, second: grain.nearest, number };
+            } else {
+                grain.second = grain.second.min(distance);
+            }
+        }
+        grain
+    }
+
+    /// Height of a grain in millimetres, 0 where it meets the next; `rise` is in widths of a cell.
+    pub(super) fn dome_mm(&self, grain: &Grain, rise: f32) -> f32 {
+        let inside = (grain.second - grain.nearest).clamp(0.0, 1.0);
+        rise * TILE_MM / self.per_side as f32 * (1.0 - (1.0 - inside).powi(2))
+    }
+
+    /// Round spots, 1 in the middle and 0 at the edge and outside. `share` of the cells have one, with a
+    /// radius between `least` and `most` cells (below 0.5), small ones more often.
+    pub(super) fn spot(&self, uv: Vec2, share: f32, least: f32, most: f32) -> f32 {
+        let spot = |(distance, number): (f32, u32)| {
+            if distance >= most || unit(hash([number, 4, 4])) >= share {
+                return 0.0;
+            }
+            let radius = least + (most - least) * unit(hash([number, 5, 5])).powi(2);
+            (1.0 - distance / radius).max(0.0)
+        };
+        self.around(uv).map(spot).fold(0.0, f32::max)
+    }
+}
+
+/// A straight, shallow groove.
+struct Scratch {
+    middle: Vec2,
+    along: Vec2,
+    half_length: f32,
+    half_width: f32,
+    strength: f32,
+}
+
+pub(super) struct Scratches(Vec<Scratch>);
+
+impl Scratches {
+    /// 0 beside the scratches to 1 in the deepest.
+    pub(super) fn depth(&self, uv: Vec2) -> f32 {
+        let depth = |scratch: &Scratch| {
+            let away = uv - scratch.middle;
+            let away = away - away.round();
+            let along = away.dot(scratch.along).abs() / scratch.half_length;
+            let across = away.perp_dot(scratch.along).abs() / scratch.half_width;
+            scratch.strength * (1.0 - across).max(0.0) * (1.0 - along * along).max(0.0)
+        };
+        self.0.iter().map(depth).fold(0.0, f32::max)
+    }
+}
+
+pub(super) fn smoothstep(low: f32, high: f32, value: f32) -> f32 {
+    let t = ((value - low) / (high - low)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// Three numbers stirred into one: the finaliser of MurmurHash3 after each.
+fn hash(numbers: [u32; 3]) -> u32 {
+    numbers.into_iter().fold(0x9e37_79b9, |hash, number| {
+        let mut h = hash ^ number.wrapping_mul(0xcc9e_2d51);
+        h = (h ^ (h >> 16)).wrapping_mul(0x85eb_ca6b);
+        h = (h ^ (h >> 13)).wrapping_mul(0xc2b2_ae35);
+        h ^ (h >> 16)
+    })
+}
+
+/// A hash as a number from 0 up to, but not including, 1.
+fn unit(hash: u32) -> f32 {
+    (hash >> 8) as f32 / 16_777_216.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_exchange_of_noises_keeps_their_contrast() {
+        for cycles in [Vec2::splat(9.0), Vec2::new(0.5, 22.0)] {
+            // The spread at one u over many seeds and v.
+            let spread = |u: f32| {
+                let values = (0..150).flat_map(|seed| {
+                    let noise = Layers { seed, finest: 100.0 }.noise(1, cycles, 2);
+                    (0..40).map(move |i| noise.at(Vec2::new(u, i as f32 / 60.0)))
+                });
+                values.map(|value| value * value).sum::<f32>().sqrt()
+            };
+            let ratio = spread(0.875) / spread(0.3);
+            assert!((ratio - 1.0).abs() < 0.1, "{cycles}: {ratio}");
+        }
+    }
+}
