@@ -80,12 +80,19 @@ pub struct CameraSpec {
     /// Vertical field of view.
     #[serde(default = "default_fov")]
     pub fov_deg: f32,
+    /// Exposure value at ISO 100: 15 in bright sun, 12 overcast, 7 indoors.
+    #[serde(default = "default_ev100")]
+    pub ev100: f32,
     /// In order of time; one is enough. Smooth in between.
     pub keys: Vec<CameraKey>,
 }
 
 fn default_fov() -> f32 {
     40.0
+}
+
+fn default_ev100() -> f32 {
+    12.0
 }
 
 /// Where the camera is at a time.
@@ -119,7 +126,7 @@ impl Default for SunSpec {
     fn default() -> Self {
         Self {
             direction: Vec3::new(-0.5, -1.0, -0.4),
-            illuminance: 8_000.0,
+            illuminance: 10_000.0,
             color: [1.0, 0.95, 0.88],
             shadows: true,
         }
@@ -144,7 +151,7 @@ pub struct EnvironmentSpec {
 }
 
 fn default_intensity() -> f32 {
-    1_500.0
+    3_000.0
 }
 
 fn default_true() -> bool {

@@ -1,6 +1,7 @@
 //! Building the scene, and waiting until all of it is there.
 
 use bevy::asset::LoadState;
+use bevy::camera::Exposure;
 use bevy::gltf::GltfAssetLabel;
 use bevy::light::{CascadeShadowConfigBuilder, EnvironmentMapLight, Skybox};
 use bevy::prelude::*;
@@ -183,6 +184,7 @@ fn spawn_view(
         Name::new("camera"),
         Camera3d::default(),
         Msaa::Sample4,
+        Exposure { ev100: scenario.camera.ev100 },
         Projection::from(PerspectiveProjection { fov: scenario.camera.fov_deg.to_radians(), ..default() }),
         ScenarioCamera { keys: scenario.camera.keys.clone() },
     ));

@@ -53,6 +53,7 @@ impl LoadedScenario {
     fn validate_view(&self) -> Result<(), ScenarioError> {
         let Scenario { camera, sun, environment, .. } = &self.scenario;
         self.range("camera.fov_deg", f64::from(camera.fov_deg), 1.0, 170.0)?;
+        self.range("camera.ev100", f64::from(camera.ev100), -10.0, 30.0)?;
         self.times("camera.keys", camera.keys.iter().map(|key| key.t))?;
         for (index, key) in camera.keys.iter().enumerate() {
             self.look(&format!("camera.keys[{index}]"), "eye", key.eye, key.target)?;
