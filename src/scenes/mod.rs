@@ -8,7 +8,7 @@
 //! |---|---|
 //! | [`meshes`] | a ground grid, a UV sphere and a vase, with normals, tangents and a UV layout to wet |
 //! | [`environment`] | a skybox and image-based light from an equirectangular photograph |
-//! | [`stone`] | tileable terracotta, sandstone and concrete |
+//! | [`stone`] | tileable terracotta, sandstone, concrete and brickwork |
 //! | [`mips`] | mip maps, which Bevy does not make, for these and for loaded photographs |
 
 pub mod environment;

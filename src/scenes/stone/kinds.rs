@@ -156,6 +156,7 @@ pub(super) fn concrete(layers: Layers) -> impl Fn(Vec2) -> Texel {
 
 #[cfg(test)]
 mod tests {
+    use super::super::brick::{TILE_MM, brick};
     use super::*;
 
     #[test]
@@ -171,9 +172,10 @@ mod tests {
                 }
             }
         }
-        let layers = Layers { seed: 5, finest: 300.0 };
+        let layers = Layers { seed: 5, finest: 300.0, tile_mm: 400.0 };
         check("terracotta", terracotta(layers));
         check("sandstone", sandstone(layers));
         check("concrete", concrete(layers));
+        check("brick", brick(Layers { tile_mm: TILE_MM, ..layers }));
     }
 }

@@ -1,13 +1,13 @@
-//! Tileable close-ups of stone: terracotta, sandstone and concrete, grown from noise.
+//! Tileable close-ups of stone: terracotta, sandstone, concrete and brickwork, grown from noise.
 //!
-//! One tile is a patch [`TILE_MM`] wide. For every texel a recipe adds up what is seen on such a patch,
+//! One tile is a patch [`Stone::tile_mm`] wide. For every texel a recipe adds up what is seen on such a patch,
 //! coarse to fine, as colour and as height in millimetres: bedding, mottling, turning marks, pits, and at
 //! the end single grains with a colour and a dome each. Hollows, where the height lies below its own blur,
 //! are darkened by the light they lose. The normal map is the slope of that same height, so relief, colour
 //! and occlusion belong together. At last the colours are scaled to the mean albedo of [`Stone::albedo`].
 //!
-//! Tiling. Grains, pits and spots live in cells whose numbers wrap, so they repeat exactly. The noise does
-//! not repeat by itself: over the last quarter of the tile, along either axis, it is exchanged smoothly for
+//! Tiling. Bricks are numbered, grains, pits and spots live in numbered cells, and the numbers wrap, so they
+//! repeat exactly. The noise does not repeat by itself: over the last quarter of the tile, along either axis, it is exchanged smoothly for
 //! the noise from before the tile's first edge. Uncorrelated noises lose contrast when averaged; the sum is
 //! divided by the root of its squared weights, which gives it back (Heitz and Neyret, "High-performance
 //! by-example noise using a histogram-preserving blending operator", 2018).
@@ -15,23 +15,22 @@
 //! What this does not do: it does not measure a stone, the recipes were chosen by eye; and it does not
 //! hide repetition, a wall of many tiles shows its pattern as a photograph would.
 
+mod brick;
 mod kinds;
 mod noise;
 mod relief;
 
 use bevy::asset::RenderAssetUsages;
-use bevy::math::{Vec2, Vec3};
+use bevy::math::{DVec3, Vec2, Vec3};
 use bevy::prelude::Image;
 use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat};
 use serde::{Deserialize, Serialize};
 
 use super::mips::{MipContent, mip_chain, srgb_from_linear, tiling_sampler, unorm8};
+use brick::brick;
 use kinds::{Texel, concrete, sandstone, terracotta};
 use noise::Layers;
 use relief::{normals, occlusion};
-
-/// Edge of a tile in millimetres of stone; the relief has natural slopes at that scale.
-pub const TILE_MM: f32 = 400.0;
 
 /// A kind of stone.
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -42,18 +41,31 @@ pub enum Stone {
     Sandstone,
     /// Grey cement skin with the pores that air bubbles leave.
     Concrete,
+    /// Moulded bricks, 215 by 65 mm, in running bond with recessed joints of sandy mortar: a wall with its
+    /// courses along u, or paving.
+    Brick,
 }
 
 impl Stone {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Terracotta, Self::Sandstone, Self::Concrete];
+    pub const ALL: [Self; 4] = [Self::Terracotta, Self::Sandstone, Self::Concrete, Self::Brick];
 
-    /// Mean diffuse albedo of the dry stone, linear RGB, `0..=1`.
+    /// Mean diffuse albedo of the dry stone, linear RGB, `0..=1`. For brickwork that includes the mortar; the
+    /// faces of the bricks alone come to (0.42, 0.20, 0.13).
     pub fn albedo(self) -> Vec3 {
         match self {
             Self::Terracotta => Vec3::new(0.50, 0.23, 0.13),
             Self::Sandstone => Vec3::new(0.45, 0.36, 0.25),
             Self::Concrete => Vec3::new(0.40, 0.38, 0.35),
+            Self::Brick => Vec3::new(0.415, 0.225, 0.155),
+        }
+    }
+
+    /// Edge of a tile in millimetres; the relief has natural slopes at that scale.
+    pub fn tile_mm(self) -> f32 {
+        match self {
+            Self::Terracotta | Self::Sandstone | Self::Concrete => 400.0,
+            Self::Brick => brick::TILE_MM,
         }
     }
 }
@@ -84,28 +96,31 @@ impl StoneMaps {
 /// two seconds on one core.
 pub fn stone_maps(stone: Stone, size: u32, seed: u32) -> StoneMaps {
     let size = size.clamp(16, 4096);
-    let layers = Layers { seed, finest: size as f32 / 3.0 };
+    let layers = Layers { seed, finest: size as f32 / 3.0, tile_mm: stone.tile_mm() };
     let texels: Vec<Texel> = match stone {
         Stone::Terracotta => every_texel(size, terracotta(layers)),
         Stone::Sandstone => every_texel(size, sandstone(layers)),
         Stone::Concrete => every_texel(size, concrete(layers)),
+        Stone::Brick => every_texel(size, brick(layers)),
     };
     let width = size as usize;
     let mut height: Vec<f32> = texels.iter().map(|texel| texel.height_mm).collect();
-    let mean = height.iter().sum::<f32>() / height.len() as f32;
+    // Sums are in double precision: 16 million texels are too many for single.
+    let mean = (height.iter().copied().map(f64::from).sum::<f64>() / height.len() as f64) as f32;
     for height in &mut height {
         *height -= mean;
     }
     let occlusion = occlusion(&height, width);
     let colours: Vec<Vec3> =
         texels.iter().zip(&occlusion).map(|(texel, light)| texel.albedo * *light).collect();
-    let gain = stone.albedo() * colours.len() as f32 / colours.iter().copied().sum::<Vec3>();
+    let sum: DVec3 = colours.iter().map(|colour| colour.as_dvec3()).sum();
+    let gain = stone.albedo() / (sum / colours.len() as f64).as_vec3();
 
     let albedo = colours.iter().flat_map(|&colour| {
         let [r, g, b] = (colour * gain).to_array().map(|value| unorm8(srgb_from_linear(value)));
         [r, g, b, 255]
     });
-    let normal = normals(&height, width).into_iter().flat_map(|normal| {
+    let normal = normals(&height, width, stone.tile_mm()).into_iter().flat_map(|normal| {
         let [x, y, z] = (normal * 0.5 + 0.5).to_array().map(unorm8);
         [x, y, z, 255]
     });
@@ -168,6 +183,29 @@ mod tests {
     }
 
     #[test]
+    fn bricks_stand_out_of_rougher_mortar() {
+        for seed in [1, 11] {
+            let maps = stone_maps(Stone::Brick, SIZE as u32, seed);
+            let (albedo, roughness) = (texels(&maps.albedo), texels(&maps.roughness));
+            // Share of the tile, mean albedo and mean roughness where the relief is within the bounds.
+            let mean = |least: f32, most: f32| {
+                let here: Vec<usize> =
+                    (0..SIZE * SIZE).filter(|&i| (least..most).contains(&maps.height_mm()[i])).collect();
+                let count = here.len() as f32;
+                let linear = |&i: &usize| Vec3::from_array(albedo[i].to_array().map(linear_from_srgb));
+                let rough = here.iter().map(|&i| roughness[i].y).sum::<f32>() / count;
+                (count / (SIZE * SIZE) as f32, here.iter().map(linear).sum::<Vec3>() / count, rough)
+            };
+            let (faces, brick, brick_rough) = mean(-0.8, 9.0);
+            let (joints, mortar, mortar_rough) = mean(-9.0, -2.0);
+            assert!((0.7..0.85).contains(&faces) && (0.1..0.25).contains(&joints), "{faces} and {joints}");
+            assert!(brick.abs_diff_eq(Vec3::new(0.42, 0.20, 0.13), 0.03), "{brick}");
+            assert!(mortar.z > 0.5 * mortar.x && mortar.z > 1.5 * brick.z, "{mortar}");
+            assert!(mortar_rough > brick_rough + 0.05, "{mortar_rough} and {brick_rough}");
+        }
+    }
+
+    #[test]
     fn tiles_meet_without_a_seam() {
         for (stone, maps) in every_stone() {
             for (name, image) in
@@ -197,6 +235,22 @@ mod tests {
                 mean += normal / (SIZE * SIZE) as f32;
             }
             assert!(mean.truncate().length() < 0.02, "{stone:?} leans: {mean}");
+        }
+    }
+
+    #[test]
+    fn normals_are_the_slope_of_the_relief() {
+        for (stone, maps) in every_stone() {
+            let two_texels_mm = 2.0 * stone.tile_mm() / SIZE as f32;
+            let height = |x: usize, y: usize| maps.height_mm()[(y % SIZE) * SIZE + x % SIZE];
+            for (i, texel) in texels(&maps.normal).into_iter().enumerate() {
+                let (x, y) = (i % SIZE + SIZE, i / SIZE + SIZE);
+                let right = (height(x + 1, y) - height(x - 1, y)) / two_texels_mm;
+                let down = (height(x, y + 1) - height(x, y - 1)) / two_texels_mm;
+                let expected = Vec3::new(-right, down, 1.0).normalize();
+                let normal = texel * 2.0 - 1.0;
+                assert!(normal.abs_diff_eq(expected, 0.01), "{stone:?} {i}: {normal}, slope {expected}");
+            }
         }
     }
 

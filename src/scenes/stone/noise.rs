@@ -3,14 +3,14 @@
 use bevy::math::{IVec2, Vec2};
 use fastnoise_lite::{FastNoiseLite, FractalType};
 
-use super::TILE_MM;
-
 /// Makes the ingredients of a recipe, each with its own random numbers.
 #[derive(Clone, Copy)]
 pub(super) struct Layers {
     pub(super) seed: u32,
     /// The most cells per tile that the texels can still show.
     pub(super) finest: f32,
+    /// Edge of the tile, for what is measured in millimetres.
+    pub(super) tile_mm: f32,
 }
 
 impl Layers {
@@ -25,7 +25,8 @@ impl Layers {
 
     /// `per_side * per_side` cells per tile.
     pub(super) fn cells(self, layer: u32, per_side: f32) -> Cells {
-        Cells { per_side: per_side.min(self.finest).max(1.0) as i32, seed: hash([self.seed, layer, 1]) }
+        let per_side = per_side.min(self.finest).max(1.0) as i32;
+        Cells { per_side, cell_mm: self.tile_mm / per_side as f32, seed: hash([self.seed, layer, 1]) }
     }
 
     pub(super) fn scratches(self, layer: u32, count: u32) -> Scratches {
@@ -76,6 +77,7 @@ impl Noise {
 /// Points scattered one to a cell over the unit square, repeating.
 pub(super) struct Cells {
     per_side: i32,
+    cell_mm: f32,
     seed: u32,
 }
 
@@ -123,8 +125,9 @@ impl Cells {
 
     /// Height of a grain in millimetres, 0 where it meets the next; `rise` is in widths of a cell.
     pub(super) fn dome_mm(&self, grain: &Grain, rise: f32) -> f32 {
-        let inside = (grain.second - grain.nearest).clamp(0.0, 1.0);
-        rise * TILE_MM / self.per_side as f32 * (1.0 - (1.0 - inside).powi(2))
+        // All points within one cell's width are known, of those beyond only some.
+        let inside = grain.second.min(1.0) - grain.nearest.min(1.0);
+        rise * self.cell_mm * (1.0 - (1.0 - inside).powi(2))
     }
 
     /// Round spots, 1 in the middle and 0 at the edge and outside. `share` of the cells have one, with a
@@ -172,7 +175,7 @@ pub(super) fn smoothstep(low: f32, high: f32, value: f32) -> f32 {
 }
 
 /// Three numbers stirred into one: the finaliser of MurmurHash3 after each.
-fn hash(numbers: [u32; 3]) -> u32 {
+pub(super) fn hash(numbers: [u32; 3]) -> u32 {
     numbers.into_iter().fold(0x9e37_79b9, |hash, number| {
         let mut h = hash ^ number.wrapping_mul(0xcc9e_2d51);
         h = (h ^ (h >> 16)).wrapping_mul(0x85eb_ca6b);
@@ -182,7 +185,7 @@ fn hash(numbers: [u32; 3]) -> u32 {
 }
 
 /// A hash as a number from 0 up to, but not including, 1.
-fn unit(hash: u32) -> f32 {
+pub(super) fn unit(hash: u32) -> f32 {
     (hash >> 8) as f32 / 16_777_216.0
 }
 
@@ -196,7 +199,7 @@ mod tests {
             // The spread at one u over many seeds and v.
             let spread = |u: f32| {
                 let values = (0..150).flat_map(|seed| {
-                    let noise = Layers { seed, finest: 100.0 }.noise(1, cycles, 2);
+                    let noise = Layers { seed, finest: 100.0, tile_mm: 400.0 }.noise(1, cycles, 2);
                     (0..40).map(move |i| noise.at(Vec2::new(u, i as f32 / 60.0)))
                 });
                 values.map(|value| value * value).sum::<f32>().sqrt()

@@ -2,14 +2,11 @@
 
 use bevy::math::Vec3;
 
-use super::TILE_MM;
-
 /// How much of the sky's light reaches each texel, `0..=1`: less, the further it lies below its
-/// surroundings, at two scales.
+/// surroundings, within a 500th of the tile and within a 130th.
 pub(super) fn occlusion(height: &[f32], width: usize) -> Vec<f32> {
-    let texels_per_mm = width as f32 / TILE_MM;
-    let near = blurred(height, width, (0.8 * texels_per_mm).ceil() as usize);
-    let far = blurred(height, width, (3.0 * texels_per_mm).ceil() as usize);
+    let near = blurred(height, width, width.div_ceil(500));
+    let far = blurred(height, width, (3 * width).div_ceil(400));
     let light = |i: usize| {
         let below = (near[i] - height[i]).max(0.0) * 0.35 + (far[i] - height[i]).max(0.0) * 0.22;
         1.0 / (1.0 + below)
@@ -34,10 +31,10 @@ fn blurred(values: &[f32], width: usize, radius: usize) -> Vec<f32> {
     pass(&pass(values))
 }
 
-/// Unit normals of a height field in millimetres: x to the right, y to the top, by central differences
+/// Unit normals of a height field in millimetres, `tile_mm` wide: x to the right, y to the top, by central differences
 /// round the edges.
-pub(super) fn normals(height: &[f32], width: usize) -> Vec<Vec3> {
-    let two_texels_mm = 2.0 * TILE_MM / width as f32;
+pub(super) fn normals(height: &[f32], width: usize, tile_mm: f32) -> Vec<Vec3> {
+    let two_texels_mm = 2.0 * tile_mm / width as f32;
     let at = |x: usize, y: usize| height[(y % width) * width + x % width];
     let normal = |(x, y): (usize, usize)| {
         let right = (at(x + 1, y) - at(x + width - 1, y)) / two_texels_mm;
@@ -58,10 +55,10 @@ mod tests {
             let place = |i: usize| [i % 16, i / 16][axis] as f32 / 16.0;
             (0..256).map(|i| 5.0 * (std::f32::consts::TAU * (place(i) - 0.5)).cos()).collect()
         };
-        let columns = normals(&summit(0), 16);
+        let columns = normals(&summit(0), 16, 400.0);
         assert!(columns[12].x > 0.05 && columns[4].x < -0.05 && columns[12].y.abs() < 1e-6);
         // Rows count downwards: above the summit the surface faces the top, +Y.
-        let rows = normals(&summit(1), 16);
+        let rows = normals(&summit(1), 16, 400.0);
         assert!(rows[4 * 16].y > 0.05 && rows[12 * 16].y < -0.05 && rows[4 * 16].x.abs() < 1e-6);
     }
 }

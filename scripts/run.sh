@@ -1,0 +1,17 @@
+#!/usr/bin/env bash
+# Installs what is missing, builds, and runs `weathering` with the given arguments. Without arguments: the sandbox
+# if there is a display, else the hose scenario into out/.
+set -euo pipefail
+invoked_from="${PWD}"
+source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
+
+cargo build --release --bin weathering
+weathering="${CARGO_TARGET_DIR}/release/weathering"
+if [ "$#" -gt 0 ]; then
+    cd "${invoked_from}"
+    exec "${weathering}" "$@"
+elif [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
+    exec "${weathering}" sandbox assets/scenarios/hose.ron
+else
+    exec "${weathering}" replay assets/scenarios/hose.ron --out out --fps 12
+fi

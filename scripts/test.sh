@@ -1,0 +1,11 @@
+#!/usr/bin/env bash
+# Installs what is missing and runs all tests, those on the graphics driver included. Arguments go to `cargo test`.
+set -euo pipefail
+source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
+
+# The window test opens one on a virtual screen and presses keys in it.
+command -v Xvfb >/dev/null || install xvfb
+command -v xdotool >/dev/null || install xdotool
+
+cargo test --release --all-targets "$@"
+cargo test --release --doc "$@"
