@@ -191,7 +191,7 @@ mod tests {
         assert_eq!(falloff([0, 0]), 4096);
         assert_eq!(falloff([256, 0]), 0);
         assert_eq!(falloff([-300, 200]), 0);
-        assert_eq!(falloff([181, 0]).abs_diff(1024) < 20, true);
+        assert!(falloff([181, 0]).abs_diff(1024) < 20);
         assert_eq!(falloff([120, 35]), falloff([-35, 120]));
     }
 

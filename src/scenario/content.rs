@@ -55,9 +55,29 @@ impl LoadedScenario {
         let mut materials = Vec::new();
         let mut environment = None;
         if looks {
-            for (name, material) in &scenario.materials {
-                materials.push(self.material_maps(&format!("materials.{name}.texture"), material)?);
-            }
+            // Growing a stone takes a second; each has a thread.
+            materials = std::thread::scope(|threads| {
+                let growing: Vec<_> = scenario
+                    .materials
+                    .iter()
+                    .map(|(name, material)| {
+                        let field = format!("materials.{name}.texture");
+                        let maps = threads.spawn({
+                            let field = field.clone();
+                            move || self.material_maps(&field, material)
+                        });
+                        (field, name, maps)
+                    })
+                    .collect();
+                growing
+                    .into_iter()
+                    .map(|(field, name, maps)| {
+                        let crashed =
+                            |_| Err(self.content_error(&field, name, "its textures could not be made"));
+                        maps.join().unwrap_or_else(crashed)
+                    })
+                    .collect::<Result<Vec<_>, _>>()
+            })?;
             if let Some(spec) = &scenario.environment {
                 let path = self.resolve("environment.map", &spec.map)?;
                 let unusable = |e| self.content_error("environment.map", &spec.map, e);

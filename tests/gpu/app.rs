@@ -1,0 +1,120 @@
+//! Small Bevy apps that render without a window.
+
+use std::time::{Duration, Instant};
+
+use bevy::app::PanicHandlerPlugin;
+use bevy::asset::RenderAssetUsages;
+use bevy::camera::RenderTarget;
+use bevy::log::LogPlugin;
+use bevy::prelude::*;
+use bevy::render::RenderPlugin;
+use bevy::render::gpu_readback::{Readback, ReadbackComplete};
+use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
+use bevy::render::render_resource::{Extent3d, PollType, TextureDimension, TextureFormat, TextureUsages};
+use bevy::render::renderer::RenderDevice;
+use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
+use bevy::time::TimeUpdateStrategy;
+use bevy::window::ExitCondition;
+use bevy::winit::WinitPlugin;
+use bevy_weathering::WeatheringPlugins;
+
+use super::harness;
+
+/// An app with everything, driven by hand; `None` where the GPU is skipped.
+pub fn app() -> Option<App> {
+    harness::gpu()?;
+    let mut app = App::new();
+    let no_window =
+        WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
+    app.add_plugins(
+        DefaultPlugins
+            .set(no_window)
+            .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
+            .disable::<WinitPlugin>()
+            .disable::<PipelinedRenderingPlugin>()
+            .disable::<LogPlugin>()
+            .disable::<PanicHandlerPlugin>(),
+    )
+    .add_plugins(WeatheringPlugins)
+    .insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
+    app.finish();
+    app.cleanup();
+    Some(app)
+}
+
+/// One frame, until the GPU is done with it.
+pub fn update(app: &mut App) {
+    app.update();
+    let device = app.world().resource::<RenderDevice>().wgpu_device();
+    device.poll(PollType::Wait { submission_index: None, timeout: None }).unwrap();
+}
+
+/// Updates until `done` says so.
+pub fn update_until(app: &mut App, what: &str, mut done: impl FnMut(&mut World) -> bool) {
+    let begun = Instant::now();
+    while !done(app.world_mut()) {
+        assert!(begun.elapsed() < Duration::from_secs(120), "waited in vain for {what}");
+        update(app);
+    }
+}
+
+#[derive(Resource, Default)]
+struct Answers(Vec<(usize, Vec<u8>)>);
+
+/// Reads textures and buffers back, in the order asked for. Rows keep their padding.
+pub fn read_back(app: &mut App, requests: Vec<Readback>) -> Vec<Vec<u8>> {
+    let count = requests.len();
+    app.insert_resource(Answers::default());
+    for (number, request) in requests.into_iter().enumerate() {
+        app.world_mut().spawn(request).observe(
+            move |data: On<ReadbackComplete>, mut answers: ResMut<Answers>, mut commands: Commands| {
+                commands.entity(data.entity).despawn();
+                if answers.0.iter().all(|(other, _)| *other != number) {
+                    answers.0.push((number, data.data.clone()));
+                }
+            },
+        );
+    }
+    update_until(app, "the read-back", |world| world.resource::<Answers>().0.len() == count);
+    let mut answers = std::mem::take(&mut app.world_mut().resource_mut::<Answers>().0);
+    answers.sort_by_key(|(number, _)| *number);
+    answers.into_iter().map(|(_, bytes)| bytes).collect()
+}
+
+/// An image that cameras can draw into.
+pub fn add_target(app: &mut App, size: UVec2) -> Handle<Image> {
+    let mut image = Image::new_uninit(
+        Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
+        TextureDimension::D2,
+        TextureFormat::Rgba8UnormSrgb,
+        RenderAssetUsages::RENDER_WORLD,
+    );
+    image.texture_descriptor.usage |= TextureUsages::RENDER_ATTACHMENT;
+    app.world_mut().resource_mut::<Assets<Image>>().add(image)
+}
+
+/// A camera that draws into a target.
+pub fn camera(target: &Handle<Image>, eye: Vec3, at: Vec3) -> impl Bundle {
+    (
+        Camera3d::default(),
+        Msaa::Off,
+        RenderTarget::from(target.clone()),
+        Transform::from_translation(eye).looking_at(at, Vec3::Y),
+    )
+}
+
+#[derive(Resource, Default)]
+struct Picture(Option<Image>);
+
+/// What the target shows, as RGB bytes.
+pub fn picture(app: &mut App, target: &Handle<Image>) -> image::RgbImage {
+    app.insert_resource(Picture::default());
+    app.world_mut().spawn(Screenshot::image(target.clone())).observe(
+        |captured: On<ScreenshotCaptured>, mut picture: ResMut<Picture>| {
+            picture.0 = Some(captured.image.clone());
+        },
+    );
+    update_until(app, "the picture", |world| world.resource::<Picture>().0.is_some());
+    let image = app.world_mut().resource_mut::<Picture>().0.take().unwrap();
+    image.try_into_dynamic().unwrap().to_rgb8()
+}

@@ -1,0 +1,166 @@
+//! Pictures: what must look the same, and what must not.
+
+use bevy::light::EnvironmentMapLight;
+use bevy::prelude::*;
+use bevy::time::TimeUpdateStrategy;
+use bevy_weathering::clock::WeatheringClock;
+use bevy_weathering::material::{BaseBrdf, DryMaterial, PorousMaterial, TextureMeaning};
+use bevy_weathering::overlay::{Overlays, Splat, SplatQueue, SplatStats, Weatherable, Wrap};
+use image::RgbImage;
+
+use super::app::{add_target, app, camera, picture, update, update_until};
+
+const SIZE: UVec2 = UVec2::new(96, 72);
+
+/// A ball on a floor under one light of each kind and an environment map, drawn once.
+fn draw(surface: Option<PorousMaterial>, metallic: f32, water_mm3_per_texel: f32) -> Option<RgbImage> {
+    let mut app = app()?;
+    let target = add_target(&mut app, SIZE);
+    let eye = camera(&target, Vec3::new(0.6, 1.2, 2.6), Vec3::new(0.0, 0.4, 0.0));
+    let camera = app.world_mut().spawn(eye).id();
+    let environment = {
+        let mut images = app.world_mut().resource_mut::<Assets<Image>>();
+        EnvironmentMapLight {
+            intensity: 400.0,
+            ..EnvironmentMapLight::hemispherical_gradient(
+                &mut images,
+                Color::linear_rgb(0.5, 0.7, 1.0),
+                Color::linear_rgb(0.8, 0.8, 0.8),
+                Color::linear_rgb(0.25, 0.2, 0.15),
+            )
+        }
+    };
+    app.world_mut().entity_mut(camera).insert(environment);
+    let material = StandardMaterial {
+        base_color: Color::linear_rgb(0.5, 0.3, 0.2),
+        perceptual_roughness: 0.6,
+        metallic,
+        ..default()
+    };
+    let material = app.world_mut().resource_mut::<Assets<StandardMaterial>>().add(material);
+    let meshes = [Mesh::from(Sphere::new(0.5)), Mesh::from(Plane3d::new(Vec3::Y, Vec2::splat(2.0)))]
+        .map(|mesh| app.world_mut().resource_mut::<Assets<Mesh>>().add(mesh));
+    let mut surfaces = vec![];
+    for (mesh, height) in meshes.into_iter().zip([0.5, 0.0]) {
+        let place = Transform::from_xyz(0.0, height, 0.0);
+        let mut entity = app.world_mut().spawn((Mesh3d(mesh), MeshMaterial3d(material.clone()), place));
+        if let Some(porous) = surface {
+            let maps = Weatherable { map_size: 64, wrap_u: Wrap::Repeat, wrap_v: Wrap::Clamp };
+            surfaces.push(entity.insert((maps, porous)).id());
+        }
+    }
+    app.world_mut().spawn((
+        DirectionalLight { illuminance: 2500.0, shadow_maps_enabled: true, ..default() },
+        Transform::default().looking_to(Vec3::new(-1.0, -1.5, -0.6), Vec3::Y),
+    ));
+    app.world_mut().spawn((
+        PointLight { intensity: 60_000.0, shadow_maps_enabled: true, ..default() },
+        Transform::from_xyz(-1.2, 1.0, 0.8),
+    ));
+    app.world_mut().spawn((
+        SpotLight { intensity: 300_000.0, shadow_maps_enabled: true, outer_angle: 0.4, ..default() },
+        Transform::from_xyz(1.0, 2.0, 1.0).looking_at(Vec3::new(0.3, 0.0, 0.3), Vec3::Y),
+    ));
+    update_until(&mut app, "the maps and materials", |world| {
+        surfaces.iter().all(|&entity| {
+            world.get::<Overlays>(entity).is_some() && world.get::<DryMaterial>(entity).is_some()
+        })
+    });
+    if water_mm3_per_texel > 0.0 {
+        // One stamp as large as the map, four times, spreads nearly evenly.
+        for &entity in &surfaces {
+            let mut queue = app.world_mut().get_mut::<SplatQueue>(entity).unwrap();
+            for center in [[0, 0], [8192, 0], [0, 8192], [8192, 8192]] {
+                let water_nl = (water_mm3_per_texel * 1000.0 * 64.0 * 64.0) as u32;
+                let splat = Splat {
+                    center,
+                    radius: [63 * 128; 2],
+                    water_nl,
+                    tick: 1,
+                    ..bytemuck::Zeroable::zeroed()
+                };
+                queue.push(splat);
+            }
+        }
+        update_until(&mut app, "the water", |world| world.resource::<SplatStats>().splats() >= 8);
+    }
+    // The water came in tick 1: let it be later than that.
+    app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+    for _ in 0..3 {
+        update(&mut app);
+    }
+    assert!(app.world().resource::<WeatheringClock>().tick() > 1);
+    Some(picture(&mut app, &target))
+}
+
+/// Mean and largest difference of two pictures, in 1/255.
+fn difference(a: &RgbImage, b: &RgbImage) -> (f64, u8) {
+    assert_eq!(a.dimensions(), b.dimensions());
+    let differences = a.as_raw().iter().zip(b.as_raw()).map(|(a, b)| a.abs_diff(*b));
+    let sum: f64 = differences.clone().map(f64::from).sum();
+    (sum / a.as_raw().len() as f64, differences.max().unwrap_or(0))
+}
+
+fn mean(picture: &RgbImage) -> f64 {
+    picture.as_raw().iter().map(|&byte| f64::from(byte)).sum::<f64>() / picture.as_raw().len() as f64
+}
+
+/// Keeps the pictures of a failed comparison where a person can look at them.
+fn keep(name: &str, pictures: &[(&str, &RgbImage)]) {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/images/actual");
+    std::fs::create_dir_all(&folder).unwrap();
+    for (which, picture) in pictures {
+        picture.save(folder.join(format!("{name}_{which}.png"))).unwrap();
+    }
+}
+
+fn assert_same(name: &str, ours: &RgbImage, standard: &RgbImage) {
+    let (average, largest) = difference(ours, standard);
+    if average > 0.05 || largest > 2 {
+        keep(name, &[("ours", ours), ("standard", standard)]);
+        panic!("{name}: differs by {average:.3} on average, {largest} at most (of 255)");
+    }
+}
+
+fn instant() -> PorousMaterial {
+    PorousMaterial { t_fill: 0.0, ..default() }
+}
+
+#[test]
+fn without_pores_or_without_water_it_is_the_standard_material() {
+    let Some(standard) = draw(None, 0.0, 0.0) else { return };
+    let (average, _) = difference(&standard, &RgbImage::new(SIZE.x, SIZE.y));
+    assert!(average > 20.0, "the scene is lit: {average}");
+
+    let glazed = PorousMaterial { alpha_poro: 0.0, ..instant() };
+    assert_same("glazed_dry", &draw(Some(glazed), 0.0, 0.0).unwrap(), &standard);
+    let solid = PorousMaterial { texture: TextureMeaning::Solid, ..glazed };
+    assert_same("glazed_solid", &draw(Some(solid), 0.0, 0.0).unwrap(), &standard);
+    assert_same("porous_dry", &draw(Some(instant()), 0.0, 0.0).unwrap(), &standard);
+    // Glazed matter takes up nothing however much falls on it.
+    assert_same("glazed_wet", &draw(Some(glazed), 0.0, 500.0).unwrap(), &standard);
+}
+
+#[test]
+fn wet_pores_are_darker_and_metal_is_not() {
+    let Some(dry) = draw(Some(instant()), 0.0, 0.0) else { return };
+    let wet = draw(Some(instant()), 0.0, 500.0).unwrap();
+    let (dry_mean, wet_mean) = (mean(&dry), mean(&wet));
+    if wet_mean > dry_mean * 0.9 {
+        keep("wet", &[("dry", &dry), ("wet", &wet)]);
+        panic!("wet {wet_mean:.1} is not darker than dry {dry_mean:.1}");
+    }
+    let metal_dry = draw(Some(instant()), 1.0, 0.0).unwrap();
+    let metal_wet = draw(Some(instant()), 1.0, 500.0).unwrap();
+    assert_same("metal", &metal_wet, &metal_dry);
+}
+
+#[test]
+fn blinn_phong_is_another_picture_of_the_same_brightness() {
+    let Some(ggx) = draw(Some(instant()), 0.0, 0.0) else { return };
+    let phong = PorousMaterial { brdf: BaseBrdf::BlinnPhong, ..instant() };
+    let phong = draw(Some(phong), 0.0, 0.0).unwrap();
+    let (average, _) = difference(&ggx, &phong);
+    assert!(average > 0.1, "the switch does something: {average}");
+    assert!((mean(&ggx) - mean(&phong)).abs() < 8.0, "{} and {}", mean(&ggx), mean(&phong));
+}

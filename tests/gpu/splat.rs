@@ -1,0 +1,153 @@
+//! The compute pass against the plain loop: not one bit may differ.
+
+use bevy::prelude::*;
+use bevy::render::gpu_readback::Readback;
+use bevy_weathering::overlay::{
+    CpuMaps, Overlays, Splat, SplatQueue, SplatStats, TexelState, Weatherable, Wrap,
+};
+
+use super::app::{app, read_back, update, update_until};
+
+const SIZE: u32 = 128;
+
+/// Splats all over the map, many across its edges, of all sizes up to the map's.
+fn random_splats(count: u32, mut seed: u64) -> Vec<Splat> {
+    let mut next = |below: u32| {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((seed >> 33) as u32) % below
+    };
+    (0..count)
+        .map(|number| {
+            let end = SIZE * 256;
+            let edge = number % 3 == 0;
+            let center =
+                |random: u32| (if edge { (random % 2048 + end - 1024) % end } else { random }) as i32;
+            let largest = if number % 17 == 0 { (SIZE - 1) * 128 } else { 256 * 9 };
+            Splat {
+                center: [center(next(end)), center(next(end))],
+                radius: [(128 + next(largest - 128)) as i32, (128 + next(largest - 128)) as i32],
+                water_nl: if number % 11 == 0 { u32::MAX - number } else { next(2_000_000) },
+                tick: 1 + number / 4,
+                diffuse: next(u32::MAX),
+                specular: next(u32::MAX),
+                bump: next(255) as i32 - 127,
+                bump_opacity: next(256),
+                pad: [0; 2],
+            }
+        })
+        .collect()
+}
+
+fn spawn_surface(app: &mut App, surface: Weatherable) -> Entity {
+    app.world_mut().spawn(surface).id()
+}
+
+fn push(app: &mut App, entity: Entity, splats: &[Splat]) {
+    let mut queue = app.world_mut().get_mut::<SplatQueue>(entity).unwrap();
+    splats.iter().for_each(|&splat| queue.push(splat));
+}
+
+/// The maps of a surface, read back.
+fn maps_of(app: &mut App, entity: Entity, surface: &Weatherable) -> CpuMaps {
+    let overlays = app.world().get::<Overlays>(entity).unwrap().clone();
+    let read = read_back(
+        app,
+        vec![
+            Readback::texture(overlays.diffuse),
+            Readback::texture(overlays.specular),
+            Readback::texture(overlays.normal),
+            Readback::buffer(overlays.state),
+        ],
+    );
+    let colors = |bytes: &[u8]| bytes.as_chunks::<4>().0.to_vec();
+    CpuMaps {
+        diffuse: colors(&read[0]),
+        specular: colors(&read[1]),
+        normal: colors(&read[2]),
+        state: bytemuck::pod_collect_to_vec(&read[3]),
+        ..CpuMaps::new(surface)
+    }
+}
+
+fn painted(app: &mut App, splats: u64) {
+    update_until(app, "the splats to be painted", |world| world.resource::<SplatStats>().splats() >= splats);
+}
+
+#[test]
+fn gpu_and_cpu_agree_to_the_bit_for_every_edge_behaviour() {
+    let Some(mut app) = app() else { return };
+    let mut all = 0;
+    for (wrap_u, wrap_v) in [
+        (Wrap::Repeat, Wrap::Repeat),
+        (Wrap::Clamp, Wrap::Repeat),
+        (Wrap::Repeat, Wrap::Clamp),
+        (Wrap::Clamp, Wrap::Clamp),
+    ] {
+        let surface = Weatherable { map_size: SIZE, wrap_u, wrap_v };
+        let entity = spawn_surface(&mut app, surface);
+        let splats = random_splats(600, 42);
+        let mut reference = CpuMaps::new(&surface);
+        // In two batches, so that a pass begins on maps that are not empty.
+        for batch in splats.chunks(350) {
+            push(&mut app, entity, batch);
+            reference.paint(batch);
+            all += batch.len() as u64;
+            painted(&mut app, all);
+        }
+        let maps = maps_of(&mut app, entity, &surface);
+        assert_eq!(maps.state, reference.state, "{surface:?}");
+        assert_eq!(maps.diffuse, reference.diffuse, "{surface:?}");
+        assert_eq!(maps.specular, reference.specular, "{surface:?}");
+        assert_eq!(maps.normal, reference.normal, "{surface:?}");
+    }
+}
+
+#[test]
+fn a_stamp_in_the_corner_deposits_what_one_in_the_middle_does() {
+    let Some(mut app) = app() else { return };
+    let surface = Weatherable { map_size: SIZE, wrap_u: Wrap::Repeat, wrap_v: Wrap::Repeat };
+    let (corner, middle) = (spawn_surface(&mut app, surface), spawn_surface(&mut app, surface));
+    let mut splat = Splat { center: [40, 200], ..random_splats(1, 9)[0] };
+    (splat.radius, splat.water_nl) = ([1700, 2300], 4_188_790);
+    push(&mut app, corner, &[splat]);
+    let half = SIZE as i32 * 128;
+    push(&mut app, middle, &[Splat { center: [40 + half, 200 + half], ..splat }]);
+    painted(&mut app, 2);
+    let (corner, middle) = (maps_of(&mut app, corner, &surface), maps_of(&mut app, middle, &surface));
+    assert_eq!(corner.water_nl(), 4_188_790);
+    assert_eq!(middle.water_nl(), 4_188_790);
+    let mut untouched = 0;
+    for y in 0..SIZE {
+        for x in 0..SIZE {
+            let here = (y * SIZE + x) as usize;
+            let there = ((y + SIZE / 2) % SIZE * SIZE + (x + SIZE / 2) % SIZE) as usize;
+            assert_eq!(corner.state[here], middle.state[there]);
+            assert_eq!(corner.diffuse[here], middle.diffuse[there]);
+            assert_eq!(corner.normal[here], middle.normal[there]);
+            // Out of reach of a stamp of 6.6 by 9 texels around (64.2, 64.8).
+            let far = |at: u32, middle: f32, radius: f32| (at as f32 + 0.5 - middle).abs() > radius + 1.0;
+            if far((x + SIZE / 2) % SIZE, 64.2, 6.7) || far((y + SIZE / 2) % SIZE, 64.8, 9.0) {
+                assert_eq!(corner.state[here], TexelState::default());
+                assert_eq!([corner.diffuse[here], corner.specular[here], corner.normal[here]], [[0; 4]; 3]);
+                untouched += 1;
+            }
+        }
+    }
+    assert!(untouched > SIZE * SIZE * 9 / 10);
+}
+
+#[test]
+fn a_map_at_rest_costs_no_dispatch() {
+    let Some(mut app) = app() else { return };
+    let surface = Weatherable { map_size: SIZE, ..default() };
+    let entity = spawn_surface(&mut app, surface);
+    spawn_surface(&mut app, surface);
+    push(&mut app, entity, &random_splats(5, 1));
+    painted(&mut app, 5);
+    let stats = app.world().resource::<SplatStats>().clone();
+    assert_eq!(stats.dispatches(), 1, "only the surface that was hit");
+    for _ in 0..10 {
+        update(&mut app);
+    }
+    assert_eq!((stats.dispatches(), stats.splats()), (1, 5));
+}
