@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use bevy::math::Vec3;
-use bytemuck::AnyBitPattern;
+use bytemuck::Pod;
 use serde_json::Value;
 
 /// SplitMix64 (Steele, Lea, Flood 2014): the same numbers on every machine.
@@ -62,12 +62,7 @@ pub fn read_glb(path: &str) -> GlbMesh {
     }
 }
 
-fn accessor<T: AnyBitPattern + bytemuck::NoUninit>(
-    json: &Value,
-    binary: &[u8],
-    index: &Value,
-    shape: &str,
-) -> Vec<T> {
+fn accessor<T: Pod>(json: &Value, binary: &[u8], index: &Value, shape: &str) -> Vec<T> {
     let number = |value: &Value| value.as_u64().expect("a whole number") as usize;
     let accessor = &json["accessors"][number(index)];
     assert_eq!(accessor["type"], shape);

@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::cwbvh::CwBvh;
-use obvhs::cwbvh::builder::{build_cwbvh, build_cwbvh_from_tris};
+use obvhs::cwbvh::builder::build_cwbvh;
 use obvhs::ray::{Ray, RayHit};
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
@@ -50,7 +50,8 @@ impl MeshBvh {
         } else {
             BvhBuildParams::medium_build()
         };
-        let bvh = build_cwbvh_from_tris(&corners, quality, &mut default());
+        let boxes: Vec<Aabb> = corners.iter().map(Triangle::aabb).collect();
+        let bvh = build_cwbvh(&padded(boxes), quality, &mut default());
         let leaves =
             bvh.primitive_indices.iter().map(|&triangle| (&corners[triangle as usize]).into()).collect();
         Self { bvh, leaves, triangles }
@@ -61,7 +62,7 @@ impl MeshBvh {
         &self.triangles
     }
 
-    /// Smallest and largest corner of everything that can be hit.
+    /// Smallest and largest corner of everything that can be hit, with some rounding errors to spare.
     pub fn bounds(&self) -> (Vec3, Vec3) {
         corners_of(&self.bvh.total_aabb)
     }
@@ -77,31 +78,63 @@ impl MeshBvh {
     pub(super) fn cast_within(&self, segment: Segment, fraction: f32) -> Option<LocalHit> {
         let mut hit = RayHit::none();
         let ray = segment.ray(fraction);
-        self.bvh.ray_traverse(ray, &mut hit, |ray, leaf| self.leaves[leaf].intersect(ray)).then(|| LocalHit {
-            fraction: hit.t / segment.length,
-            triangle: self.bvh.primitive_indices[hit.primitive_id as usize],
+        self.bvh.ray_traverse(ray, &mut hit, |ray, leaf| intersect(&self.leaves[leaf], ray)).then(|| {
+            LocalHit {
+                fraction: hit.t - HEAD_START,
+                triangle: self.bvh.primitive_indices[hit.primitive_id as usize],
+            }
         })
     }
 }
 
-/// A segment as direction and length: the intersections are computed in units of its mesh, however it is scaled.
+/// How far outside its edges a triangle can be hit, in barycentric coordinates: more than rounding leaves open between
+/// two triangles that share an edge, less than anybody could see.
+const EDGE_OVERLAP: f32 = 1.0e-6;
+
+/// Distance to the triangle, from either side, or infinity (Möller & Trumbore 1997, with a precomputed normal).
+///
+/// In place of `RtTriangle::intersect`, which misses what falls exactly on an edge: there the sign of a zero decides.
+#[inline(always)]
+fn intersect(triangle: &RtTriangle, ray: &Ray) -> f32 {
+    let to_corner = triangle.v0 - ray.origin;
+    let across = ray.direction.cross(to_corner);
+    let inverse = 1.0 / triangle.ng.dot(ray.direction);
+    let u = across.dot(triangle.e2) * inverse;
+    let v = across.dot(triangle.e1) * inverse;
+    let w = 1.0 - u - v;
+    // Written so that the NaN of a parallel ray fails.
+    if u >= -EDGE_OVERLAP && v >= -EDGE_OVERLAP && w >= -EDGE_OVERLAP {
+        let distance = triangle.ng.dot(to_corner) * inverse;
+        if distance >= ray.tmin && distance <= ray.tmax {
+            return distance;
+        }
+    }
+    f32::INFINITY
+}
+
+/// A segment as a ray whose parameter is 0 at the start and 1 at the end, however the mesh is scaled.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Segment {
     start: Vec3,
-    direction: Vec3,
-    length: f32,
+    delta: Vec3,
 }
 
+/// obvhs drops boxes that end before the parameter 1e-4, flat ones altogether: rays start this much earlier, and what
+/// is hit before the segment begins does not count.
+const HEAD_START: f32 = 4.0e-4;
+
 impl Segment {
+    /// `None` for a segment without length or with a coordinate that is not finite.
     pub(super) fn new(start: Vec3, end: Vec3) -> Option<Self> {
-        let (direction, length) = (end - start).normalize_and_length();
-        (length > 0.0 && length.is_finite() && start.is_finite()).then_some(Self { start, direction, length })
+        // Adding zero takes the sign off a zero, by which obvhs would sort the sides of a box the wrong way round.
+        let delta = end - start + Vec3::ZERO;
+        (start.is_finite() && delta.is_finite() && delta != Vec3::ZERO).then_some(Self { start, delta })
     }
 
     #[inline]
     fn ray(&self, fraction: f32) -> Ray {
-        let (start, direction) = (self.start.to_array(), self.direction.to_array());
-        Ray::new(start.into(), direction.into(), 0.0, self.length * fraction)
+        let start = self.start - self.delta * HEAD_START;
+        Ray::new(start.to_array().into(), self.delta.to_array().into(), HEAD_START, HEAD_START + fraction)
     }
 }
 
@@ -120,7 +153,7 @@ impl BoxBvh {
             .iter()
             .map(|(min, max)| Aabb { min: min.to_array().into(), max: max.to_array().into() })
             .collect();
-        Self { bvh: build_cwbvh(&boxes, BvhBuildParams::fastest_build(), &mut default()) }
+        Self { bvh: build_cwbvh(&padded(boxes), BvhBuildParams::fastest_build(), &mut default()) }
     }
 
     /// Smallest and largest corner of everything; an empty box if there is nothing.
@@ -138,11 +171,77 @@ impl BoxBvh {
         let mut hit = RayHit::none();
         self.bvh.ray_traverse(segment.ray(1.0), &mut hit, |ray, leaf| {
             let instance = self.bvh.primitive_indices[leaf];
-            cast(instance, ray.tmax / segment.length).map_or(f32::INFINITY, |f| f * segment.length)
+            cast(instance, ray.tmax - HEAD_START).map_or(f32::INFINITY, |fraction| fraction + HEAD_START)
         });
     }
 }
 
+/// Boxes a few rounding errors larger than they are: else a ray through the edge between two flat boxes may miss both.
+fn padded(mut boxes: Vec<Aabb>) -> Vec<Aabb> {
+    let all = boxes.iter().fold(Aabb::INVALID, |all, aabb| all.union(aabb));
+    let pad = 4.0e-6 * all.min.abs().max(all.max.abs()).max_element();
+    for aabb in &mut boxes {
+        aabb.min -= pad;
+        aabb.max += pad;
+    }
+    boxes
+}
+
 fn corners_of(aabb: &Aabb) -> (Vec3, Vec3) {
     (Vec3::from_array(aabb.min.to_array()), Vec3::from_array(aabb.max.to_array()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn flat_meshes_are_hit_at_the_very_start_and_end_of_a_segment_at_any_scale() {
+        for scale in [1.0e-3, 1.0, 1.0e3] {
+            let grid = crate::scenes::meshes::ground(Vec2::splat(4.0 * scale), UVec2::splat(8)).unwrap();
+            let bvh = MeshBvh::build(MeshTriangles::from_mesh(&grid).unwrap());
+            for step in 0..=1000 {
+                let fraction = step as f32 / 1000.0;
+                let length = 0.15 * scale;
+                let start = Vec3::new(0.3 * scale, fraction * length, -0.7 * scale);
+                let hit = bvh.cast(start, start - Vec3::Y * length).map(|hit| hit.fraction);
+                // The ends themselves belong to this segment or to its neighbour.
+                if step > 0 && step < 1000 {
+                    assert!(
+                        hit.is_some_and(|hit| (hit - fraction).abs() < 1e-5),
+                        "{scale} {fraction} {hit:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_sign_of_a_zero_does_not_matter() {
+        let grid = crate::scenes::meshes::ground(Vec2::splat(4.0), UVec2::splat(8)).unwrap();
+        let bvh = MeshBvh::build(MeshTriangles::from_mesh(&grid).unwrap());
+        for x in [0.0, -0.0] {
+            for z in [0.0, -0.0] {
+                assert!(bvh.cast(Vec3::new(0.0, 1.0, 0.0), Vec3::new(x, -1.0, z)).is_some(), "{x} {z}");
+                assert!(bvh.cast(Vec3::new(x, 1.0, z), Vec3::new(0.0, -1.0, 0.0)).is_some(), "{x} {z}");
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_slips_through_edges_and_corners() {
+        let grid = crate::scenes::meshes::ground(Vec2::splat(4.0), UVec2::splat(8)).unwrap();
+        let bvh = MeshBvh::build(MeshTriangles::from_mesh(&grid).unwrap());
+        // Down along the edges and diagonals of the cells, and through their corners; upright and aslant.
+        for step in -15..=15 {
+            for other in -15..=15 {
+                let point = Vec3::new(step as f32 / 8.0, 0.0, other as f32 / 8.0);
+                for lean in [Vec3::ZERO, Vec3::new(0.3, 0.0, -0.0), Vec3::new(-0.125, 0.0, 0.25)] {
+                    let (above, below) = (point + Vec3::Y + lean, point - Vec3::Y - lean);
+                    assert!(bvh.cast(above, below).is_some(), "{point} {lean}");
+                    assert!(bvh.cast(below, above).is_some(), "{point} {lean} from below");
+                }
+            }
+        }
+    }
 }

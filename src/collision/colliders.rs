@@ -128,3 +128,65 @@ pub(super) fn attach_colliders(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use bevy::asset::AssetPlugin;
+    use bevy::mesh::MeshPlugin;
+
+    use super::*;
+    use crate::collision::CollisionPlugin;
+
+    fn app() -> App {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default(), MeshPlugin))
+            .add_plugins((crate::clock::ClockPlugin::default(), crate::effect::EffectPlugin))
+            .add_plugins((crate::particle::ParticlePlugin, CollisionPlugin));
+        app
+    }
+
+    fn add(app: &mut App, mesh: Mesh) -> Mesh3d {
+        Mesh3d(app.world_mut().resource_mut::<Assets<Mesh>>().add(mesh))
+    }
+
+    fn update_until_built(app: &mut App) {
+        app.update();
+        while app.world().resource::<MeshColliders>().building() > 0 {
+            app.update();
+        }
+        app.update();
+    }
+
+    #[test]
+    fn instances_share_one_bvh_and_bad_meshes_are_refused_once() {
+        let mut app = app();
+        let ball = add(&mut app, Sphere::new(1.0).into());
+        let bare = add(&mut app, Mesh::from(Sphere::new(1.0)).with_removed_attribute(Mesh::ATTRIBUTE_UV_0));
+        let spawn = |app: &mut App, mesh: &Mesh3d| {
+            app.world_mut().spawn((Weatherable::default(), mesh.clone(), Transform::default())).id()
+        };
+        let (one, two, refused) = (spawn(&mut app, &ball), spawn(&mut app, &ball), spawn(&mut app, &bare));
+        update_until_built(&mut app);
+        let bvh = |entity| app.world().get::<SurfaceCollider>(entity).map(|collider| collider.0.clone());
+        assert!(Arc::ptr_eq(&bvh(one).unwrap(), &bvh(two).unwrap()));
+        assert!(bvh(refused).is_none());
+        assert_eq!(app.world().get::<NotWeatherable>(refused), Some(&NotWeatherable(TriangleError::NoUvs)));
+    }
+
+    #[test]
+    fn a_changed_mesh_gets_a_new_bvh() {
+        let mut app = app();
+        let mesh = add(&mut app, Cuboid::new(1.0, 1.0, 1.0).into());
+        let surface =
+            app.world_mut().spawn((Weatherable::default(), mesh.clone(), Transform::default())).id();
+        update_until_built(&mut app);
+        let top = |app: &App| app.world().get::<SurfaceCollider>(surface).unwrap().0.bounds().1.y;
+        assert!((top(&app) - 0.5).abs() < 1e-3);
+        let taller = Mesh::from(Cuboid::new(1.0, 4.0, 1.0));
+        app.world_mut().resource_mut::<Assets<Mesh>>().insert(mesh.id(), taller).unwrap();
+        for _ in 0..2 {
+            update_until_built(&mut app);
+        }
+        assert!((top(&app) - 2.0).abs() < 1e-3, "{}", top(&app));
+    }
+}

@@ -173,3 +173,79 @@ pub(super) fn update_collision_scene(
     surfaces.sort_unstable_by_key(|(entity, ..)| *entity);
     *scene = CollisionScene::new(surfaces);
 }
+
+#[cfg(test)]
+mod tests {
+    use bevy::math::Quat;
+
+    use super::*;
+    use crate::collision::MeshTriangles;
+
+    fn square() -> Arc<MeshBvh> {
+        let mesh = Mesh::from(Plane3d::new(Vec3::Y, Vec2::ONE));
+        Arc::new(MeshBvh::build(MeshTriangles::from_mesh(&mesh).unwrap()))
+    }
+
+    #[test]
+    fn scaled_turned_and_mirrored_instances_are_hit_where_they_are() {
+        let turned = Affine3A::from_scale_rotation_translation(
+            Vec3::new(3.0, 1.0, -0.5),
+            Quat::from_rotation_z(std::f32::consts::FRAC_PI_2),
+            Vec3::new(5.0, 0.0, 0.0),
+        );
+        let upright = Entity::from_raw_u32(2).unwrap();
+        let flat = Entity::from_raw_u32(1).unwrap();
+        let scene = CollisionScene::new([(flat, Affine3A::IDENTITY, square()), (upright, turned, square())]);
+        // The square stands at x = 5 now, 3 m up and down and half a metre to the sides.
+        let hit = scene.cast(Vec3::new(4.0, 2.9, 0.4), Vec3::new(6.0, 2.9, 0.4)).unwrap();
+        assert_eq!(hit.surface, upright);
+        assert!((hit.fraction - 0.5).abs() < 1e-5 && (hit.point.x - 5.0).abs() < 1e-5, "{hit:?}");
+        assert!((hit.normal - Vec3::NEG_X).length() < 1e-5);
+        assert!((hit.uv_per_metre - Vec2::new(0.5 / 3.0, 1.0)).length() < 1e-4, "{}", hit.uv_per_metre);
+        assert!(scene.cast(Vec3::new(4.0, 2.9, 0.6), Vec3::new(6.0, 2.9, 0.6)).is_none());
+    }
+
+    #[test]
+    fn the_closer_of_two_surfaces_is_hit() {
+        let raised = Affine3A::from_translation(Vec3::Y * 0.5);
+        let ids = [1, 2].map(|id| Entity::from_raw_u32(id).unwrap());
+        let scene = CollisionScene::new([(ids[0], Affine3A::IDENTITY, square()), (ids[1], raised, square())]);
+        let cast = |from: f32, to: f32| scene.cast(Vec3::Y * from, Vec3::Y * to).map(|hit| hit.surface);
+        assert_eq!(cast(1.0, -1.0), Some(ids[1]));
+        assert_eq!(cast(-1.0, 1.0), Some(ids[0]));
+        assert_eq!(cast(0.4, 0.1), None);
+    }
+
+    #[test]
+    fn what_cannot_be_inverted_is_left_out_and_nonsense_hits_nothing() {
+        let id = Entity::from_raw_u32(1).unwrap();
+        let flat = Affine3A::from_scale(Vec3::new(1.0, 0.0, 1.0));
+        let nan = Affine3A::from_translation(Vec3::NAN);
+        assert!(CollisionScene::new([(id, flat, square()), (id, nan, square())]).is_empty());
+        let scene = CollisionScene::new([(id, Affine3A::IDENTITY, square())]);
+        assert!(scene.cast(Vec3::NAN, Vec3::NEG_Y).is_none());
+        assert!(scene.cast(Vec3::ZERO, Vec3::ZERO).is_none());
+        assert!(scene.cast(Vec3::Y, Vec3::NEG_Y * f32::INFINITY).is_none());
+        assert!(CollisionScene::default().cast(Vec3::Y, Vec3::NEG_Y).is_none());
+    }
+
+    #[test]
+    fn the_scene_follows_its_surfaces() {
+        let mut world = World::new();
+        world.init_resource::<CollisionScene>();
+        let mut schedule = Schedule::default();
+        schedule.add_systems(update_collision_scene);
+        let surface = world.spawn((GlobalTransform::default(), SurfaceCollider(square()))).id();
+        let mut hits_at = |world: &mut World, height: f32| {
+            schedule.run(world);
+            let (above, below) = (Vec3::Y * (height + 0.1), Vec3::Y * (height - 0.1));
+            world.resource::<CollisionScene>().cast(above, below).is_some()
+        };
+        assert!(hits_at(&mut world, 0.0));
+        *world.get_mut::<GlobalTransform>(surface).unwrap() = GlobalTransform::from_xyz(0.0, 3.0, 0.0);
+        assert!(!hits_at(&mut world, 0.0));
+        assert!(hits_at(&mut world, 3.0));
+        world.despawn(surface);
+        assert!(!hits_at(&mut world, 3.0));
+    }
+}

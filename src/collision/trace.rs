@@ -74,3 +74,87 @@ pub(super) fn report_impacts(
         );
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use bevy::math::Affine3A;
+    use bevy::tasks::ComputeTaskPool;
+
+    use super::*;
+    use crate::collision::{MeshBvh, MeshTriangles};
+
+    /// A square of 2 m at height 0, uv 0..1 along x and -z.
+    fn world() -> (World, Entity) {
+        ComputeTaskPool::get_or_init(default);
+        let mut world = World::new();
+        let surface = world.spawn(ReportImpacts).id();
+        let square = Mesh::from(Plane3d::new(Vec3::Y, Vec2::ONE));
+        let bvh = Arc::new(MeshBvh::build(MeshTriangles::from_mesh(&square).unwrap()));
+        world.insert_resource(CollisionScene::new([(surface, Affine3A::IDENTITY, bvh)]));
+        world.insert_resource(WeatheringClock::new(10));
+        world.init_resource::<Impacts>();
+        world.init_resource::<Messages<SurfaceImpact>>();
+        (world, surface)
+    }
+
+    /// A particle that moved from one point to another in the last tick.
+    fn particle(world: &mut World, from: Vec3, to: Vec3, number: u32) -> Entity {
+        let life = Lifespan { ticks_left: 5, born_at: 0 };
+        let velocity = Velocity((to - from) * 10.0);
+        world.spawn((Position(to), velocity, life, Volume(number), Sequence(number), EffectIndex(0))).id()
+    }
+
+    fn run(world: &mut World) {
+        let mut schedule = Schedule::default();
+        schedule.add_systems((trace_particles, report_impacts).chain());
+        schedule.run(world);
+    }
+
+    #[test]
+    fn what_crossed_the_surface_hits_it_and_the_rest_flies_on() {
+        let (mut world, surface) = world();
+        let down = particle(&mut world, Vec3::new(0.5, 0.1, 0.5), Vec3::new(0.5, -0.1, 0.5), 8);
+        let up = particle(&mut world, Vec3::new(-0.5, -0.3, 0.5), Vec3::new(-0.5, 0.1, 0.5), 3);
+        let above = particle(&mut world, Vec3::new(0.0, 0.4, 0.0), Vec3::new(0.0, 0.2, 0.0), 1);
+        let beside = particle(&mut world, Vec3::new(1.5, 0.1, 0.0), Vec3::new(1.5, -0.1, 0.0), 2);
+        run(&mut world);
+
+        let has_hit = |entity| world.get::<Lifespan>(entity).unwrap().has_hit();
+        assert_eq!([down, up, above, beside].map(has_hit), [true, true, false, false]);
+        let impacts = &world.resource::<Impacts>().0;
+        assert_eq!(impacts.iter().map(|impact| impact.sequence.0).collect::<Vec<_>>(), [3, 8]);
+        for impact in impacts {
+            assert_eq!(impact.surface, surface);
+            assert!(impact.point.y.abs() < 1e-4, "{}", impact.point);
+            assert!(impact.normal.dot(impact.velocity) < 0.0, "the side it came from");
+            let uv = Vec2::new(impact.point.x, impact.point.z) * 0.5 + 0.5;
+            assert!((impact.uv - uv).length() < 1e-3, "{} {uv}", impact.uv);
+            assert!((impact.uv_per_metre - 0.5).length() < 1e-4);
+        }
+        assert_eq!(world.resource::<Messages<SurfaceImpact>>().len(), 2);
+    }
+
+    #[test]
+    fn a_particle_born_late_in_the_tick_did_not_cross_what_lay_before() {
+        let (mut world, _) = world();
+        let late = particle(&mut world, Vec3::new(0.0, 0.5, 0.0), Vec3::new(0.0, -0.5, 0.0), 1);
+        // It moved only the last quarter: from -0.25 on.
+        world.get_mut::<Lifespan>(late).unwrap().born_at = 0xC000;
+        run(&mut world);
+        assert!(world.resource::<Impacts>().0.is_empty());
+    }
+
+    #[test]
+    fn many_threads_find_the_same_order() {
+        let (mut world, _) = world();
+        for number in (0..5000).rev() {
+            let x = (number as f32 / 2500.0 - 1.0) * 0.99;
+            particle(&mut world, Vec3::new(x, 0.1, 0.2), Vec3::new(x, -0.1, 0.2), number);
+        }
+        run(&mut world);
+        let found: Vec<u32> = world.resource::<Impacts>().0.iter().map(|impact| impact.volume_nl).collect();
+        assert_eq!(found, (0..5000).collect::<Vec<_>>());
+    }
+}

@@ -219,3 +219,61 @@ pub(super) fn prepare_splats(
         &BindGroupEntries::sequential((batches, splats, tiles, list)),
     ));
 }
+
+#[cfg(test)]
+mod tests {
+    use bytemuck::Zeroable;
+
+    use super::*;
+
+    /// A main world with one surface, inside a render world, as `ExtractSchedule` sees them.
+    fn worlds() -> (World, Entity) {
+        let mut main = MainWorld::default();
+        let overlays =
+            Overlays { diffuse: default(), specular: default(), normal: default(), state: default() };
+        let surface = main.spawn((Weatherable::default(), overlays, SplatQueue::default())).id();
+        let mut render = World::new();
+        render.insert_resource(main);
+        render.init_resource::<PendingSplats>();
+        (render, surface)
+    }
+
+    fn push(render: &mut World, surface: Entity, ticks: std::ops::Range<u32>) {
+        let mut main = render.resource_mut::<MainWorld>();
+        let mut queue = main.get_mut::<SplatQueue>(surface).unwrap();
+        ticks.for_each(|tick| queue.push(Splat { tick, ..Splat::zeroed() }));
+    }
+
+    fn pending(render: &World) -> Vec<u32> {
+        let surfaces = &render.resource::<PendingSplats>().surfaces;
+        surfaces.iter().flat_map(|surface| &surface.splats).map(|splat| splat.tick).collect()
+    }
+
+    #[test]
+    fn every_splat_is_moved_once_whatever_the_frame_holds() {
+        let (mut render, surface) = worlds();
+        let mut schedule = Schedule::default();
+        schedule.add_systems(extract_splats);
+        for frame in [0..0, 0..1, 1..6, 6..6, 6..7] {
+            push(&mut render, surface, frame);
+            schedule.run(&mut render);
+            let main = render.resource::<MainWorld>();
+            assert!(main.get::<SplatQueue>(surface).unwrap().is_empty());
+        }
+        // Nothing was painted: all of it still waits, in order.
+        assert_eq!(pending(&render), [0, 1, 2, 3, 4, 5, 6]);
+    }
+
+    #[test]
+    fn a_surface_that_is_gone_takes_its_splats_along() {
+        let (mut render, surface) = worlds();
+        let mut schedule = Schedule::default();
+        schedule.add_systems(extract_splats);
+        push(&mut render, surface, 0..3);
+        schedule.run(&mut render);
+        render.resource_mut::<MainWorld>().despawn(surface);
+        schedule.run(&mut render);
+        assert!(render.resource::<PendingSplats>().surfaces.is_empty());
+        assert!(render.resource::<PendingSplats>().by_entity.is_empty());
+    }
+}

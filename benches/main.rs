@@ -1,0 +1,51 @@
+//! Benches: what a tick costs, against the brute force of 2007 and against bare loops.
+//!
+//! | group | measures | against |
+//! |---|---|---|
+//! | [`bytes`] | memory of a particle in flight | - |
+//! | [`tick`] | a tick of scene 1 in the steady state | [`hoff`], every particle against every triangle |
+//! | [`live`] | the highest emission that leaves a 60 Hz tick inside its 16.67 ms | the budget |
+//! | [`far`] | a particle with nothing near it | a loop over two arrays |
+//! | [`cast`] | closest hits of short segments, from 1,000 to 1,000,000 triangles | [`hoff`] |
+//! | [`splat`] | painting on the CPU, and sorting for the GPU | each other |
+//!
+//! `cargo bench --bench main` runs all of them, `cargo bench --bench main -- cast` one. Results, predictions and
+//! limits are in `benches/NOTES.md`.
+
+mod bytes;
+mod cast;
+mod far;
+mod glb;
+mod hoff;
+mod live;
+mod measure;
+mod scene;
+mod splat;
+mod tick;
+
+use std::time::Duration;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+
+/// Small samples: the ratios come from [`measure::means`], and the whole run should take minutes.
+fn config() -> Criterion {
+    Criterion::default()
+        .without_plots()
+        .sample_size(10)
+        .nresamples(10_000)
+        .warm_up_time(Duration::from_millis(500))
+        .measurement_time(Duration::from_secs(2))
+}
+
+/// A baseline that is wrong must not be timed.
+fn baseline_is_right(_: &mut Criterion) {
+    hoff::check();
+}
+
+criterion_group! {
+    name = benches;
+    config = config();
+    // Memory first, while nothing has been given back to the allocator that it could hand out again.
+    targets = bytes::bench, baseline_is_right, tick::bench, live::bench, far::bench, cast::bench, splat::bench
+}
+criterion_main!(benches);

@@ -1,0 +1,180 @@
+//! Structs that Rust and WGSL share: same names, same order, same offsets, same scalars.
+//!
+//! The shaders import each other with directives that naga does not know, so each struct and each flag is cut out
+//! of its file and parsed by itself; the shared ones hold nothing but scalars and vectors.
+
+use std::mem::offset_of;
+
+use bevy::render::render_resource::{ShaderType, encase::UniformBuffer};
+use bevy_weathering::material::PorousUniform;
+use bevy_weathering::overlay::{Splat, TexelState, TileHeader};
+use naga::{Expression, Literal, Module, ScalarKind, TypeInner};
+
+const SPLAT: &str = include_str!("../shaders/splat.wgsl");
+const WET_MAP: &str = include_str!("../shaders/common/wet_map.wgsl");
+
+#[derive(Debug, PartialEq)]
+struct Layout {
+    fields: Vec<Field>,
+    /// Bytes from one row of an array to the next.
+    size: u32,
+}
+
+#[derive(Debug, PartialEq)]
+struct Field {
+    name: String,
+    offset: u32,
+    size: u32,
+    kind: ScalarKind,
+}
+
+/// The structs and flags of a shader.
+fn parse(source: &str) -> Module {
+    let mut cut = String::new();
+    let mut inside = false;
+    for line in source.lines() {
+        inside |= line.starts_with("struct ");
+        if inside || line.starts_with("const FLAG_") {
+            cut += line;
+            cut += "\n";
+        }
+        inside &= line != "}";
+    }
+    naga::front::wgsl::parse_str(&cut).expect("the structs need nothing that is imported")
+}
+
+/// The layout of a struct by the rules of WGSL.
+fn wgsl_layout(source: &str, name: &str) -> Layout {
+    let module = parse(source);
+    let found = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name));
+    let (_, found) = found.expect("the shader has the struct");
+    let TypeInner::Struct { members, span } = &found.inner else { unreachable!("cut out as a struct") };
+    let fields = members.iter().map(|member| {
+        let inner = &module.types[member.ty].inner;
+        Field {
+            name: member.name.clone().expect("fields have names"),
+            offset: member.offset,
+            size: inner.size(module.to_ctx()),
+            kind: inner.scalar_kind().expect("fields are scalars and vectors"),
+        }
+    });
+    Layout { fields: fields.collect(), size: *span }
+}
+
+/// What a field is made of.
+trait Words {
+    const KIND: ScalarKind;
+}
+
+impl Words for u32 {
+    const KIND: ScalarKind = ScalarKind::Uint;
+}
+
+impl Words for i32 {
+    const KIND: ScalarKind = ScalarKind::Sint;
+}
+
+impl<T: Words, const N: usize> Words for [T; N] {
+    const KIND: ScalarKind = T::KIND;
+}
+
+fn rust_field<R, F: Words>(name: &str, offset: usize, _: fn(&R) -> &F) -> Field {
+    Field { name: name.into(), offset: offset as u32, size: size_of::<F>() as u32, kind: F::KIND }
+}
+
+/// The layout of a `repr(C)` struct. Does not compile when a field is missing.
+macro_rules! rust_layout {
+    ($row:ident { $($field:ident),* }) => {{
+        let _ = |$row { $($field: _),* }: $row| ();
+        Layout {
+            fields: vec![
+                $(rust_field(stringify!($field), offset_of!($row, $field), |row: &$row| &row.$field)),*
+            ],
+            size: size_of::<$row>() as u32,
+        }
+    }};
+}
+
+#[test]
+fn a_splat_is_the_same_row_on_both_sides() {
+    let rust =
+        rust_layout!(Splat { center, radius, water_nl, tick, diffuse, specular, bump, bump_opacity, pad });
+    assert_eq!(wgsl_layout(SPLAT, "Splat"), rust);
+}
+
+#[test]
+fn a_tile_is_the_same_row_on_both_sides() {
+    assert_eq!(wgsl_layout(SPLAT, "TileHeader"), rust_layout!(TileHeader { x, y, start, count }));
+}
+
+#[test]
+fn a_texel_is_the_same_row_for_the_painter_and_for_the_material() {
+    let rust = rust_layout!(TexelState { water_nl, wet_since });
+    assert_eq!(wgsl_layout(SPLAT, "TexelState"), rust);
+    assert_eq!(wgsl_layout(WET_MAP, "TexelState"), rust);
+}
+
+/// The Rust side writes `[tick, hz]`.
+#[test]
+fn the_clock_is_two_words() {
+    let Layout { fields, size } = wgsl_layout(WET_MAP, "Clock");
+    let words: Vec<_> = fields.iter().map(|field| (field.name.as_str(), field.offset, field.size)).collect();
+    assert_eq!(words, [("tick", 0, 4), ("hz", 4, 4)]);
+    assert!(fields.iter().all(|field| field.kind == ScalarKind::Uint));
+    assert_eq!(size, 8);
+}
+
+/// `PorousUniform` has no layout of its own: encase writes it. So its bytes are looked at.
+#[test]
+fn the_constants_of_a_surface_are_read_as_they_are_written() {
+    let written = PorousUniform {
+        alpha_poro: 1.0,
+        s_p: 2.0,
+        m: 3.0,
+        k_w: 4.0,
+        t_fill: 5.0,
+        capacity_nl: 6.0,
+        size: 7,
+        flags: 8,
+    };
+    let expected = [
+        ("alpha_poro", ScalarKind::Float, 1.0f32.to_bits()),
+        ("s_p", ScalarKind::Float, 2.0f32.to_bits()),
+        ("m", ScalarKind::Float, 3.0f32.to_bits()),
+        ("k_w", ScalarKind::Float, 4.0f32.to_bits()),
+        ("t_fill", ScalarKind::Float, 5.0f32.to_bits()),
+        ("capacity_nl", ScalarKind::Float, 6.0f32.to_bits()),
+        ("size", ScalarKind::Uint, 7),
+        ("flags", ScalarKind::Uint, 8),
+    ];
+    let mut buffer = UniformBuffer::new(Vec::new());
+    buffer.write(&written).unwrap();
+    let bytes = buffer.into_inner();
+
+    let Layout { fields, size } = wgsl_layout(WET_MAP, "PorousUniform");
+    let read = fields.iter().map(|field| {
+        let word: [u8; 4] = bytes[field.offset as usize..][..field.size as usize].try_into().unwrap();
+        (field.name.as_str(), field.kind, u32::from_le_bytes(word))
+    });
+    assert_eq!(read.collect::<Vec<_>>(), expected);
+    assert_eq!(u64::from(size), PorousUniform::min_size().get());
+}
+
+#[test]
+fn flags_are_the_same_bits_on_both_sides() {
+    let module = parse(WET_MAP);
+    let in_shader = module.constants.iter().map(|(_, constant)| {
+        let Expression::Literal(Literal::U32(bit)) = module.global_expressions[constant.init] else {
+            panic!("{constant:?} is not a plain u32")
+        };
+        (constant.name.as_deref().unwrap(), bit)
+    });
+    let in_rust = [
+        ("FLAG_SQRT_K", PorousUniform::FLAG_SQRT_K),
+        ("FLAG_SOLID", PorousUniform::FLAG_SOLID),
+        ("FLAG_BLINN_PHONG", PorousUniform::FLAG_BLINN_PHONG),
+        ("FLAG_CLAMP_U", PorousUniform::FLAG_CLAMP_U),
+        ("FLAG_CLAMP_V", PorousUniform::FLAG_CLAMP_V),
+    ];
+    assert_eq!(in_shader.collect::<Vec<_>>(), in_rust);
+}

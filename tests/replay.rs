@@ -1,0 +1,434 @@
+//! The program itself, run as its users run it: what it writes, what it says, and how it ends.
+
+use std::collections::BTreeSet;
+use std::ffi::OsStr;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+const HOSE: &str = "assets/scenarios/hose.ron";
+const VASE: &str = "assets/scenarios/vase.ron";
+
+/// A tap over a square metre of ground: what [`Tree`] holds, and what its copies spoil.
+const TAP: &str = r#"(
+    seconds: 1.0,
+    max_particles: 1000,
+    camera: (keys: [(eye: (0.0, 1.0, 2.0), target: (0.0, 0.0, 0.0))]),
+    materials: {"plain": ()},
+    surfaces: [
+        (
+            name: "ground",
+            mesh: Ground(size: (1.0, 1.0), cells: (2, 2)),
+            material: "plain",
+            scale: (1.0, 1.0, 1.0),
+            maps: (map_size: 256),
+        ),
+    ],
+    emitters: [
+        (
+            name: "tap",
+            effect: "effects/tap.effect.ron",
+            rate: 200.0,
+            speed: 1.0,
+            keys: [(position: (0.0, 0.2, 0.0), target: (0.0, 0.0, 0.0))],
+        ),
+    ],
+)
+"#;
+const MESH: &str = "Ground(size: (1.0, 1.0), cells: (2, 2))";
+const EFFECT: &str = "\"effects/tap.effect.ron\"";
+
+/// How a run of the program ended.
+struct Outcome {
+    code: Option<i32>,
+    stdout: String,
+    stderr: String,
+}
+
+impl Outcome {
+    /// The report of a run that went well and had no `--out`.
+    fn report(&self) -> Value {
+        self.assert_success();
+        serde_json::from_str(&self.stdout).expect("standard output is the report")
+    }
+
+    fn assert_success(&self) {
+        assert_eq!(self.code, Some(0), "{}", self.stderr);
+    }
+
+    /// The run was refused with a message that has all of `named`, before anything was written.
+    fn assert_refused(&self, named: &[&str], out: &Path) {
+        assert_eq!(self.code, Some(2), "{named:?}: {}", self.stderr);
+        for name in named {
+            assert!(self.stderr.contains(name), "no {name:?} in: {}", self.stderr);
+        }
+        assert!(!self.stderr.contains("panicked"), "{}", self.stderr);
+        assert!(!out.exists(), "{named:?}: something was written");
+    }
+}
+
+/// `weathering replay FILE OPTIONS...`.
+fn replay(file: impl AsRef<OsStr>, options: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_weathering"));
+    command.current_dir(env!("CARGO_MANIFEST_DIR")).arg("replay").arg(file).args(options.split_whitespace());
+    command
+}
+
+fn run(command: &mut Command) -> Outcome {
+    let output = command.output().expect("the program starts");
+    Outcome {
+        code: output.status.code(),
+        stdout: String::from_utf8_lossy(&output.stdout).into(),
+        stderr: String::from_utf8_lossy(&output.stderr).into(),
+    }
+}
+
+/// A report without what differs from run to run.
+fn without_timing(mut report: Value) -> Value {
+    let timing = report.as_object_mut().and_then(|report| report.remove("timing"));
+    assert!(timing.is_some(), "a report tells how long it took");
+    report
+}
+
+fn read_report(out: &Path) -> Value {
+    let bytes = fs::read(out.join("report.json")).expect("there is a report");
+    serde_json::from_slice(&bytes).expect("the report is JSON")
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().expect("a number")
+}
+
+fn surfaces(report: &Value) -> &[Value] {
+    report["surfaces"].as_array().expect("a list of surfaces")
+}
+
+fn triangle_counts(report: &Value) -> Vec<(&str, u64)> {
+    let row = |surface: &Value| surface["triangles"].as_u64().expect("a whole number");
+    surfaces(report).iter().map(|surface| (surface["name"].as_str().expect("a name"), row(surface))).collect()
+}
+
+/// All files below a folder, hidden ones too.
+fn files_below(folder: &Path) -> BTreeSet<String> {
+    let mut files = BTreeSet::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(next) = folders.pop() {
+        for entry in fs::read_dir(next).expect("the folder is there") {
+            let path = entry.expect("it can be read").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let name = path.strip_prefix(folder).expect("it is below the folder");
+                files.insert(name.display().to_string());
+            }
+        }
+    }
+    files
+}
+
+/// The files of a finished run.
+fn expected_files(surfaces: &[&str], frames: u32) -> BTreeSet<String> {
+    let maps = ["diffuse", "specular", "normal", "water", "wet_since"];
+    let maps = surfaces.iter().flat_map(|name| maps.map(|map| format!("maps/{name}_{map}.png")));
+    let frames = (0..frames).map(|frame| format!("frame_{frame:05}.png"));
+    maps.chain(frames).chain(["report.json".into()]).collect()
+}
+
+/// A 16-bit map.
+fn grey_map(out: &Path, name: &str) -> Vec<u16> {
+    let image = image::open(out.join("maps").join(name)).expect("the map is an image");
+    assert_eq!(image.color(), image::ColorType::L16, "{name}");
+    image.into_luma16().into_raw()
+}
+
+/// A scenario's folders in a temporary place, with good and bad files, and a folder beside them that no scenario
+/// may read.
+struct Tree(TempDir);
+
+impl Tree {
+    fn new() -> Self {
+        let tree = Self(tempfile::tempdir().expect("a temporary folder"));
+        let effect = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/effects/hose.effect.ron");
+        let effect = fs::read(effect).expect("the effect is in the repository");
+        let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models/bunny_1000.glb");
+        let model = fs::read(model).expect("the model is in the repository");
+        for (path, content) in [
+            ("tree/effects/tap.effect.ron", effect.as_slice()),
+            ("outside/tap.effect.ron", effect.as_slice()),
+            ("tree/effects/unknown.effect.ron", b"(\n    wetness: 3.5,\n)"),
+            ("tree/effects/nan.effect.ron", b"(bump: NaN)"),
+            ("tree/models/text.glb", b"This is no model."),
+            ("tree/models/cut.glb", &model[..model.len() / 2]),
+            ("tree/scenarios/tap.ron", TAP.as_bytes()),
+        ] {
+            let path = tree.path(path);
+            fs::create_dir_all(path.parent().expect("a file in a folder")).expect("a new folder");
+            fs::write(path, content).expect("a new file");
+        }
+        #[cfg(unix)]
+        std::os::unix::fs::symlink(
+            tree.path("outside/tap.effect.ron"),
+            tree.path("tree/effects/link.effect.ron"),
+        )
+        .expect("a new link");
+        tree
+    }
+
+    fn path(&self, path: &str) -> PathBuf {
+        self.0.path().join(path)
+    }
+
+    fn tap(&self) -> PathBuf {
+        self.path("tree/scenarios/tap.ron")
+    }
+
+    /// [`TAP`] with one thing changed.
+    fn spoilt(&self, from: &str, to: &str) -> PathBuf {
+        assert_eq!(TAP.matches(from).count(), 1, "{from}");
+        let path = self.path("tree/scenarios/spoilt.ron");
+        fs::write(&path, TAP.replace(from, to)).expect("a new file");
+        path
+    }
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let report = |threads| {
+        let options = format!("--no-render --seconds 2 --threads {threads}");
+        without_timing(run(&mut replay(HOSE, &options)).report())
+    };
+    let one = report(1);
+    assert_eq!(one["digest"].as_str().map(str::len), Some(64), "{one}");
+    assert_eq!(one, report(2));
+    assert_eq!(one, report(8));
+}
+
+#[test]
+fn another_seed_is_another_run() {
+    let report = |options: &str| run(&mut replay(HOSE, options)).report();
+    let own = report("--no-render --seconds 1");
+    let other = report("--no-render --seconds 1 --seed 12345");
+    assert_eq!(other["seed"], 12345);
+    assert_ne!(own["seed"], other["seed"]);
+    assert_ne!(own["digest"], other["digest"]);
+    assert_eq!(own["particles"]["emitted"], other["particles"]["emitted"]);
+}
+
+#[test]
+fn the_numbers_of_a_report_add_up() {
+    let report = run(&mut replay(HOSE, "--no-render --seconds 2")).report();
+    assert_eq!((number(&report["ticks"]), number(&report["seconds"])), (120.0, 2.0));
+    let particles = &report["particles"];
+    let hit = number(&particles["hit"]);
+    let elsewhere = number(&particles["alive"]) + number(&particles["expired"]);
+    assert!(hit > 0.0, "{report}");
+    assert_eq!(number(&particles["emitted"]), hit + elsewhere);
+    let impacts: f64 = surfaces(&report).iter().map(|surface| number(&surface["impacts"])).sum();
+    assert_eq!(impacts, hit);
+    for surface in surfaces(&report) {
+        let (water, received) = (number(&surface["water_mm3"]), number(&surface["received_mm3"]));
+        assert!((water - received).abs() <= 1e-6 * received, "{surface}");
+        let wet = number(&surface["wet_fraction"]);
+        assert!((0.0..=1.0).contains(&wet), "{surface}");
+        assert_eq!(wet > 0.0, water > 0.0, "{surface}");
+    }
+    assert_eq!(triangle_counts(&report), [("ground", 1584), ("sphere", 936), ("bunny", 1000)]);
+}
+
+#[test]
+fn the_vase_has_its_triangles() {
+    let report = run(&mut replay(VASE, "--no-render --seconds 0.5")).report();
+    assert_eq!(triangle_counts(&report), [("ground", 1584), ("vase", 11_008)]);
+}
+
+#[test]
+fn out_holds_the_report_and_the_maps_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("not/there/yet");
+    let to_folder = run(replay(HOSE, "--no-render --seconds 2 --out").arg(&out));
+    to_folder.assert_success();
+    assert_eq!(files_below(&out), expected_files(&["ground", "sphere", "bunny"], 0));
+    let to_output = run(&mut replay(HOSE, "--no-render --seconds 2"));
+    let report = read_report(&out);
+    assert_eq!(without_timing(report.clone()), without_timing(to_output.report()));
+
+    for surface in surfaces(&report) {
+        let name = surface["name"].as_str().unwrap();
+        let water = grey_map(&out, &format!("{name}_water.png"));
+        let wet_since = grey_map(&out, &format!("{name}_wet_since.png"));
+        assert_eq!(water.iter().any(|&film| film > 0), number(&surface["water_mm3"]) > 0.0, "{name}");
+        // A film of less than half a micrometre is written as 0.
+        let wet = |(film, since): (&u16, &u16)| *film == 0 || *since > 0;
+        assert!(water.iter().zip(&wet_since).all(wet), "{name}: water that came at no time");
+        assert!(wet_since.iter().all(|&since| since <= 200), "{name}: water from the future");
+        for map in ["diffuse", "specular", "normal"] {
+            let image = image::open(out.join(format!("maps/{name}_{map}.png"))).unwrap();
+            assert_eq!(image.color(), image::ColorType::Rgba8, "{name} {map}");
+            assert_eq!((image.width() * image.height()) as usize, water.len(), "{name} {map}");
+        }
+    }
+}
+
+#[test]
+fn the_water_map_holds_the_water_in_micrometres() {
+    let tree = Tree::new();
+    let out = tree.path("out");
+    run(replay(tree.tap(), "--no-render --out").arg(&out)).assert_success();
+    let water = grey_map(&out, "ground_water.png");
+    let film_um: f64 = water.iter().copied().map(f64::from).sum();
+    // A square metre; a micrometre on a mm² is a thousandth of a mm³.
+    let texel_mm2 = 1.0e6 / water.len() as f64;
+    let expected = number(&read_report(&out)["surfaces"][0]["water_mm3"]);
+    let actual = film_um * texel_mm2 / 1000.0;
+    assert!(expected > 0.0);
+    // Each value is rounded, and texels on the edge of two triangles count for both.
+    assert!((actual / expected - 1.0).abs() < 0.02, "{actual} mm³ in the map, {expected} mm³ in the report");
+}
+
+#[test]
+fn pictures_come_with_the_same_digest() {
+    if std::env::var("WEATHERING_SKIP_GPU").is_ok_and(|value| value == "1") {
+        eprintln!("skipped: needs a GPU, and WEATHERING_SKIP_GPU=1");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let mut command = replay(HOSE, "--seconds 1 --fps 2 --size 96x64 --out");
+    // Vulkan's window-system code wants one even when no window is opened.
+    run(command.arg(&out).env("XDG_RUNTIME_DIR", folder.path())).assert_success();
+
+    assert_eq!(files_below(&out), expected_files(&["ground", "sphere", "bunny"], 2));
+    for name in ["frame_00000.png", "frame_00001.png"] {
+        let picture = image::open(out.join(name)).unwrap().into_luma8();
+        assert_eq!(picture.dimensions(), (96, 64), "{name}");
+        let (darkest, brightest) =
+            picture.iter().fold((255, 0), |(low, high), &grey| (grey.min(low), grey.max(high)));
+        assert!(brightest - darkest > 32, "{name} is flat: {darkest} to {brightest}");
+    }
+    let rendered = read_report(&out);
+    assert_eq!(rendered["timing"]["frames"], 2);
+    let unseen = run(&mut replay(HOSE, "--seconds 1 --no-render")).report();
+    assert!(number(&unseen["particles"]["hit"]) > 0.0);
+    assert_eq!(without_timing(rendered), without_timing(unseen));
+}
+
+#[test]
+fn bad_scenarios_are_refused_by_file_field_and_value() {
+    let tree = Tree::new();
+    let out = tree.path("out");
+    let absolute = format!("{:?}", tree.path("outside/tap.effect.ron"));
+    let inside = tree.path("tree/effects/tap.effect.ron");
+    let absolute_inside = format!("{inside:?}");
+    let cases: &[(&str, &str, &[&str])] = &[
+        // Shape.
+        ("speed: 1.0", "speed 1.0", &[":23:", "colon"]),
+        ("seconds: 1.0", "seconds: 1.0, wetness: 0.5", &[":2:", "`wetness`"]),
+        ("speed: 1.0", "", &[":25:", "`speed`"]),
+        ("rate: 200.0", "rate: \"many\"", &[":22:", "many"]),
+        ("max_particles: 1000", "max_particles: 99999999999", &[":3:", "out of bounds"]),
+        // Numbers.
+        ("rate: 200.0", "rate: NaN", &["`emitters[0].rate`", "NaN"]),
+        ("rate: 200.0", "rate: -5.0", &["`emitters[0].rate`", "-5"]),
+        ("speed: 1.0", "speed: inf", &["`emitters[0].speed`", "inf"]),
+        ("seconds: 1.0", "seconds: inf", &["`seconds`", "inf"]),
+        ("seconds: 1.0", "seconds: -1.0", &["`seconds`", "-1"]),
+        ("seconds: 1.0", "seconds: 1.0, tick_hz: 0", &["`tick_hz`", "0"]),
+        ("max_particles: 1000", "max_particles: 10000001", &["`max_particles`", "10000001"]),
+        ("scale: (1.0, 1.0, 1.0)", "scale: (1.0, 0.0, 1.0)", &["`surfaces[0].scale`", "[1, 0, 1]"]),
+        ("scale: (1.0, 1.0, 1.0)", "scale: (1.0, NaN, 1.0)", &["`surfaces[0].scale.y`", "NaN"]),
+        ("map_size: 256", "map_size: 100000", &["`surfaces[0].maps.map_size`", "100000"]),
+        ("map_size: 256", "map_size: 100", &["`surfaces[0].maps.map_size`", "100"]),
+        ("(2, 2)", "(0, 2)", &["`surfaces[0].mesh`", "0 triangles"]),
+        ("(2, 2)", "(100000, 100000)", &["`surfaces[0].mesh`", "20000000000 triangles"]),
+        ("(eye: (0.0, 1.0, 2.0), target: (0.0, 0.0, 0.0))", "", &["`camera.keys`", "empty"]),
+        ("(0.0, 0.2, 0.0)", "(0.0, 0.0, 0.0)", &["`emitters[0].keys[0].target`", "[0, 0, 0]"]),
+        // Names.
+        ("\"ground\"", "\"../ground\"", &["`surfaces[0].name`", "../ground"]),
+        ("material: \"plain\"", "material: \"gold\"", &["`surfaces[0].material`", "gold"]),
+        // Files.
+        (MESH, "File(\"models/none.glb\")", &["`surfaces[0].mesh`", "models/none.glb", "no such file"]),
+        (MESH, "File(\"models/text.glb\")", &["`surfaces[0].mesh`", "models/text.glb"]),
+        (MESH, "File(\"models/cut.glb\")", &["`surfaces[0].mesh`", "models/cut.glb"]),
+        (MESH, "File(\"models\")", &["`surfaces[0].mesh`", "\"models\""]),
+        (EFFECT, "\"effects/none.effect.ron\"", &["`emitters[0].effect`", "effects/none.effect.ron"]),
+        (EFFECT, "\"effects/unknown.effect.ron\"", &["effects/unknown.effect.ron", " 2:", "`wetness`"]),
+        (EFFECT, "\"effects/nan.effect.ron\"", &["effects/nan.effect.ron", "`bump`", "NaN"]),
+        // Ways out.
+        (EFFECT, "\"../../etc/passwd\"", &["`emitters[0].effect`", "../../etc/passwd", "outside"]),
+        (EFFECT, "\"../outside/tap.effect.ron\"", &["`emitters[0].effect`", "../outside/tap", "outside"]),
+        (EFFECT, &absolute, &["`emitters[0].effect`", &absolute, "outside"]),
+        (EFFECT, &absolute_inside, &["`emitters[0].effect`", &absolute_inside, "outside"]),
+        (MESH, "File(\"/etc/passwd\")", &["`surfaces[0].mesh`", "/etc/passwd", "outside"]),
+        #[cfg(unix)]
+        (EFFECT, "\"effects/link.effect.ron\"", &["`emitters[0].effect`", "link.effect.ron", "outside"]),
+    ];
+    for &(from, to, named) in cases {
+        let file = tree.spoilt(from, to);
+        let outcome = run(replay(&file, "--no-render --out").arg(&out));
+        let message = format!("error: {}:", file.display());
+        outcome.assert_refused(&[&[message.as_str()], named].concat(), &out);
+    }
+    // Without the fault it runs.
+    run(replay(tree.tap(), "--no-render --out").arg(&out)).assert_success();
+    assert!(out.exists());
+}
+
+#[test]
+fn what_is_no_file_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    for file in [folder.path().join("none.ron"), folder.path().to_owned()] {
+        let outcome = run(replay(&file, "--no-render --out").arg(&out));
+        outcome.assert_refused(&[&file.display().to_string(), "cannot be read"], &out);
+    }
+}
+
+#[test]
+fn options_out_of_range_are_refused_by_name_and_value() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    for (options, named) in [
+        ("--seconds NaN", ["`seconds`", "NaN"]),
+        ("--seconds inf", ["`seconds`", "inf"]),
+        ("--seconds 0", ["`seconds`", "0"]),
+        ("--threads 0", ["`threads`", "0"]),
+        ("--fps 0", ["`fps`", "0"]),
+        ("--size 0x64", ["`size`", "0x64"]),
+        ("--size 96x100000", ["`size`", "96x100000"]),
+        ("--size 96", ["--size", "96"]),
+    ] {
+        let outcome = run(replay(VASE, "--no-render --out").arg(&out).args(options.split_whitespace()));
+        outcome.assert_refused(&named, &out);
+    }
+}
+
+#[test]
+fn without_a_driver_it_says_what_to_install() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let mut command = replay(HOSE, "--seconds 1 --out");
+    let command = command
+        .arg(&out)
+        .env("XDG_RUNTIME_DIR", folder.path())
+        .env("WGPU_BACKEND", "vulkan")
+        // The old and the new name of the variable.
+        .env("VK_ICD_FILENAMES", "/nonexistent")
+        .env("VK_DRIVER_FILES", "/nonexistent");
+    run(command).assert_refused(&["mesa-vulkan-drivers", "--no-render"], &out);
+}
+
+#[test]
+fn a_folder_that_cannot_be_made_is_named() {
+    let tree = Tree::new();
+    let file = tree.path("file");
+    fs::write(&file, "mine").unwrap();
+    let out = file.join("out");
+    let before = files_below(tree.0.path());
+    let outcome = run(replay(tree.tap(), "--no-render --out").arg(&out));
+    outcome.assert_refused(&["cannot write", &out.display().to_string()], &out);
+    assert_eq!(fs::read_to_string(&file).unwrap(), "mine");
+    assert_eq!(files_below(tree.0.path()), before);
+}
