@@ -1,6 +1,8 @@
-//! Reads the one shape of GLB that the models here have: one mesh of one primitive, floats and 16-bit indices.
+//! Reads the one shape of GLB that the models here have: one mesh of one primitive, floats and 16-bit
+//! indices.
 //!
-//! Not a glTF reader: what is not there is a panic. It spares the benches an asset server and a renderer's plugins.
+//! Not a glTF reader: what is not there is a panic. It spares the benches an asset server and a renderer's
+//! plugins.
 
 use bevy::asset::RenderAssetUsages;
 use bevy::mesh::{Indices, Mesh, PrimitiveTopology};

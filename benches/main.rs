@@ -9,8 +9,10 @@
 //! | [`cast`] | closest hits of short segments, from 1,000 to 1,000,000 triangles | [`hoff`] |
 //! | [`splat`] | painting on the CPU, and sorting for the GPU | each other |
 //!
-//! `cargo bench --bench main` runs all of them, `cargo bench --bench main -- cast` one. Results, predictions and
-//! limits are in `benches/NOTES.md`.
+//! `cargo bench --bench main` runs all of them, `cargo bench --bench main -- cast` one. Results, predictions
+//! and limits are in `benches/NOTES.md`.
+
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a bench that cannot measure stops")]
 
 mod bytes;
 mod cast;
@@ -20,6 +22,7 @@ mod hoff;
 mod live;
 mod measure;
 mod scene;
+mod sim;
 mod splat;
 mod tick;
 

@@ -1,8 +1,9 @@
 //! What all groups share: which of them are asked for, means with the contenders taking turns, and ratios.
 //!
-//! Criterion measures one function after the other, so a ratio of two of its numbers holds whatever the machine
-//! did in between. [`means`] lets the contenders take turns, a few calls each; its plain means are what ratios are
-//! made of. Both kinds of numbers come from the same run and stand beside each other in the output.
+//! Criterion measures one function after the other, so a ratio of two of its numbers holds whatever the
+//! machine did in between. [`means`] lets the contenders take turns, a few calls each; its plain means are
+//! what ratios are made of. Both kinds of numbers come from the same run and stand beside each other in the
+//! output.
 
 use std::time::{Duration, Instant};
 
@@ -31,8 +32,8 @@ const OPTIONS_WITH_VALUE: [&str; 18] = [
     "--significance-level",
 ];
 
-/// Whether criterion's filter lets anything of this group through; setting a group up costs more than a glance.
-/// Understands filters that begin with the group's name, or are a part of it.
+/// Whether criterion's filter lets anything of this group through; setting a group up costs more than a
+/// glance. Understands filters that begin with the group's name, or are a part of it.
 pub fn wanted(group: &str) -> bool {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let filter = arguments.iter().enumerate().find(|&(i, argument)| {

@@ -45,7 +45,7 @@ struct TexelState {
     wet_since: u32,
 }
 
-// The twin of `SurfaceBatch` in `src/overlay/gpu.rs`.
+// The twin of `SurfaceBatch` in `src/overlay/gpu/prepare.rs`.
 struct SurfaceBatch {
     // Texels along each side of the maps.
     size: u32,

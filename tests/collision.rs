@@ -1,8 +1,8 @@
 //! The collision scene against brute force in double precision.
 //!
-//! Single precision may see the edge of a triangle, or the end of a segment, a little to the side of where it is.
-//! So the brute force also finds crossings up to [`MARGIN`] outside, and calls those doubtful that are not at
-//! least as far inside. The scene must name one of them, and may not pass one that is beyond doubt.
+//! Single precision may see the edge of a triangle, or the end of a segment, a little beside where it is.
+//! So the brute force also finds crossings up to [`MARGIN`] outside, and calls those doubtful that are not
+//! at least as far inside. The scene must name one of them, and may not pass one that is beyond doubt.
 
 use std::sync::Arc;
 
@@ -16,8 +16,8 @@ use crate::common::{Random, read_glb};
 
 /// How far single precision may be off, in barycentric coordinates and in the fraction of a segment.
 const MARGIN: f64 = 1e-5;
-/// How far a hit may be off the plane of its triangle; metres. The fraction follows: it counts for more on a short
-/// segment, and on one that grazes the triangle.
+/// How far a hit may be off the plane of its triangle; metres. The fraction follows: it may be off by more
+/// on a short segment, and on one that grazes the triangle.
 const DEPTH_TOLERANCE: f64 = 2e-6;
 /// How far the scene's uv may be from that of the same crossing.
 const UV_TOLERANCE: f64 = 1e-3;

@@ -1,4 +1,4 @@
-//! What several modules need: random numbers that are the same everywhere, and meshes without an asset server.
+//! What several modules need: random numbers, the same everywhere, and meshes without an asset server.
 
 use std::path::Path;
 

@@ -1,13 +1,14 @@
 //! Structs that Rust and WGSL share: same names, same order, same offsets, same scalars.
 //!
-//! The shaders import each other with directives that naga does not know, so each struct and each flag is cut out
-//! of its file and parsed by itself; the shared ones hold nothing but scalars and vectors.
+//! The shaders import each other with directives that naga does not know, so structs and flags are cut out of
+//! their file and parsed by themselves; the shared ones hold nothing but scalars and vectors.
 
 use std::mem::offset_of;
 
+use bevy::math::UVec2;
 use bevy::render::render_resource::{ShaderType, encase::UniformBuffer};
 use bevy_weathering::material::PorousUniform;
-use bevy_weathering::overlay::{Splat, TexelState, TileHeader};
+use bevy_weathering::overlay::{Splat, SurfaceBatch, TexelState, TileHeader};
 use naga::{Expression, Literal, Module, ScalarKind, TypeInner};
 
 const SPLAT: &str = include_str!("../shaders/splat.wgsl");
@@ -177,4 +178,18 @@ fn flags_are_the_same_bits_on_both_sides() {
         ("FLAG_CLAMP_V", PorousUniform::FLAG_CLAMP_V),
     ];
     assert_eq!(in_shader.collect::<Vec<_>>(), in_rust);
+}
+
+/// `SurfaceBatch` is written by encase, too.
+#[test]
+fn a_batch_is_read_as_it_is_written() {
+    let written = SurfaceBatch { size: 1, first_tile: 2, clamped: UVec2::new(3, 4) };
+    let mut buffer = UniformBuffer::new(Vec::<u8>::new());
+    buffer.write(&written).expect("a vector holds anything");
+    let words: &[u32] = bytemuck::cast_slice(buffer.as_ref());
+    assert_eq!(words, [1, 2, 3, 4]);
+    let Layout { fields, size } = wgsl_layout(SPLAT, "SurfaceBatch");
+    let read: Vec<_> = fields.iter().map(|field| (field.name.as_str(), field.offset)).collect();
+    assert_eq!(read, [("size", 0), ("first_tile", 4), ("clamped", 8)]);
+    assert_eq!(u64::from(size), SurfaceBatch::min_size().get());
 }

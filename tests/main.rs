@@ -2,6 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
+/// Closest hits against brute force.
+mod collision;
+/// Random numbers and meshes for the other modules.
+mod common;
 /// The real shaders on a real driver, against their twins.
 mod gpu {
     /// Small apps that render without a window.
@@ -16,5 +20,11 @@ mod gpu {
     /// Painting.
     mod splat;
 }
+/// Structs that Rust and WGSL share.
+mod layout;
+/// The program as its users run it: output, errors, exit codes.
+mod replay;
 /// What the parts are together: order, independence of a renderer.
 mod schedule;
+/// The sandbox in a real window, with real keys.
+mod window;

@@ -144,8 +144,8 @@ fn grey_map(out: &Path, name: &str) -> Vec<u16> {
     image.into_luma16().into_raw()
 }
 
-/// A scenario's folders in a temporary place, with good and bad files, and a folder beside them that no scenario
-/// may read.
+/// A scenario's folders in a temporary place, with good and bad files, and beside them a folder that no
+/// scenario may read.
 struct Tree(TempDir);
 
 impl Tree {
@@ -324,10 +324,10 @@ fn bad_scenarios_are_refused_by_file_field_and_value() {
     let absolute_inside = format!("{inside:?}");
     let cases: &[(&str, &str, &[&str])] = &[
         // Shape.
-        ("speed: 1.0", "speed 1.0", &[":23:", "colon"]),
+        ("speed: 1.0", "speed 1.0", &[":20:", "colon"]),
         ("seconds: 1.0", "seconds: 1.0, wetness: 0.5", &[":2:", "`wetness`"]),
-        ("speed: 1.0", "", &[":25:", "`speed`"]),
-        ("rate: 200.0", "rate: \"many\"", &[":22:", "many"]),
+        ("speed: 1.0,", "", &[":22:", "`speed`"]),
+        ("rate: 200.0", "rate: \"many\"", &[":19:", "float"]),
         ("max_particles: 1000", "max_particles: 99999999999", &[":3:", "out of bounds"]),
         // Numbers.
         ("rate: 200.0", "rate: NaN", &["`emitters[0].rate`", "NaN"]),
@@ -431,4 +431,34 @@ fn a_folder_that_cannot_be_made_is_named() {
     outcome.assert_refused(&["cannot write", &out.display().to_string()], &out);
     assert_eq!(fs::read_to_string(&file).unwrap(), "mine");
     assert_eq!(files_below(tree.0.path()), before);
+}
+
+/// A glTF may name further files; those must stay inside, too.
+#[test]
+fn a_gltf_cannot_reach_out_of_the_tree() {
+    let outside = tempfile::tempdir().unwrap();
+    let tree = outside.path().join("tree");
+    fs::create_dir_all(&tree).unwrap();
+    fs::write(outside.path().join("secret.bin"), [0; 64]).unwrap();
+    let scenario = r#"(
+        seconds: 0.1,
+        camera: (keys: [(eye: (0.0, 1.5, 3.0), target: (0.0, 0.0, 0.0))]),
+        materials: {"clay": ()},
+        surfaces: [(name: "mesh", mesh: File("mesh.gltf"), material: "clay")],
+    )"#;
+    fs::write(tree.join("scene.ron"), scenario).unwrap();
+    for uri in ["../secret.bin", "%2e%2e/secret.bin", "/etc/hostname"] {
+        let gltf = format!(
+            r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"uri": "{uri}", "byteLength": 64}}]}}"#
+        );
+        fs::write(tree.join("mesh.gltf"), gltf).unwrap();
+        let output = Command::new(env!("CARGO_BIN_EXE_weathering"))
+            .args(["replay", "--no-render"])
+            .arg(tree.join("scene.ron"))
+            .output()
+            .unwrap();
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{uri}: {message}");
+        assert!(message.contains("outside the scenario's tree") && message.contains("buffers"), "{message}");
+    }
 }

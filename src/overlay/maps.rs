@@ -90,7 +90,8 @@ impl TexelAreas {
             .zip(states)
             .filter(|(_, state)| state.water_nl > 0)
             .map(|(&area, _)| f64::from(area))
-            .sum();
+            // Not `sum`, whose nothing is -0.
+            .fold(0.0, |sum, area| sum + area);
         if self.total_mm2 > 0.0 { wet / self.total_mm2 } else { 0.0 }
     }
 }

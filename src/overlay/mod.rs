@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 
 pub use cpu::{CpuMaps, CpuOverlayPlugin};
 pub use deposit::{DepositPlugin, SplatQueue, SurfaceTotals, deposit_splats};
-pub use gpu::{GpuOverlayPlugin, Overlays, SplatStats};
+pub use gpu::{GpuOverlayPlugin, Overlays, SplatStats, SurfaceBatch};
 pub use maps::{TexelAreas, TexelState};
 pub use splat::Splat;
 pub use tiles::{TILE_SIZE, TileBins, TileHeader};

@@ -6,7 +6,7 @@ use bytemuck::{Pod, Zeroable};
 use super::Wrap;
 use super::kernel::{Axis, SUBTEXELS};
 
-/// A stamp on the maps of one surface. A row of the GPU's splat buffer: `Splat` in `shaders/common/splat.wgsl` has
+/// A stamp on the maps of one surface. A row of the GPU's splat buffer: `Splat` in `shaders/splat.wgsl` has
 /// the same fields in the same order.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]

@@ -90,7 +90,8 @@ impl Streaks {
             streaks.indices.extend([0, 0, 0]);
         }
         let normals = vec![[0.0, 1.0, 0.0]; streaks.positions.len()];
-        Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
+        // Kept in the main world, too: replaced twice within a frame, it would otherwise be gone the second time.
+        Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
             .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, streaks.positions)
             .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, normals)
             .with_inserted_attribute(Mesh::ATTRIBUTE_COLOR, streaks.colors)

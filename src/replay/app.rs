@@ -1,9 +1,12 @@
 //! The app of a replay, with and without a renderer.
 
-use bevy::app::{PanicHandlerPlugin, TaskPoolOptions, TaskPoolPlugin, TerminalCtrlCHandlerPlugin};
+use bevy::app::{
+    PanicHandlerPlugin, TaskPoolOptions, TaskPoolPlugin, TaskPoolThreadAssignmentPolicy,
+    TerminalCtrlCHandlerPlugin,
+};
 use bevy::asset::AssetPlugin;
 use bevy::gltf::GltfPlugin;
-use bevy::image::ImagePlugin;
+use bevy::image::{CompressedImageFormatSupport, CompressedImageFormats, ImagePlugin};
 use bevy::log::LogPlugin;
 use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
@@ -31,12 +34,31 @@ pub fn require_adapter() -> Result<(), ReplayError> {
     if adapters.is_empty() { Err(ReplayError::NoAdapter) } else { Ok(()) }
 }
 
+/// Thread pools with exactly `threads` threads for the systems of a tick, or as many as there are cores. Bevy's default
+/// leaves a machine of two cores one.
+pub fn task_pools(threads: Option<usize>) -> TaskPoolPlugin {
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    let exactly = |threads: usize| TaskPoolThreadAssignmentPolicy {
+        min_threads: threads,
+        max_threads: threads,
+        percent: 1.0,
+        on_thread_spawn: None,
+        on_thread_destroy: None,
+    };
+    TaskPoolPlugin {
+        task_pool_options: TaskPoolOptions {
+            io: exactly(1),
+            async_compute: exactly(1),
+            compute: exactly(threads.unwrap_or_else(cores)),
+            ..default()
+        },
+    }
+}
+
 /// An app that runs when told to.
 pub(super) fn build(options: &ReplayOptions, scenario: ScenarioPlugin) -> App {
     let mut app = App::new();
-    let tasks = TaskPoolPlugin {
-        task_pool_options: options.threads.map_or_else(default, TaskPoolOptions::with_num_threads),
-    };
+    let tasks = task_pools(options.threads);
     let assets = AssetPlugin { file_path: options.scenario.tree.to_string_lossy().into_owned(), ..default() };
     if options.render {
         let no_window =
@@ -66,6 +88,8 @@ pub(super) fn build(options: &ReplayOptions, scenario: ScenarioPlugin) -> App {
                 MeshPlugin,
                 GltfPlugin::default(),
             ))
+            // Nothing is drawn: no compressed texture is needed.
+            .insert_resource(CompressedImageFormatSupport(CompressedImageFormats::NONE))
             .init_asset::<AnimationClip>()
             .add_plugins(WeatheringPlugins.build().disable::<GpuOverlayPlugin>())
             .add_plugins(CpuOverlayPlugin);

@@ -24,6 +24,15 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), ReplayError> {
     file.persist(path).map(drop).map_err(|error| failed(error.error))
 }
 
+/// Makes the folder and checks that files can be written into it: better before a long run than after it.
+///
+/// # Errors
+/// [`ReplayError::Write`] with the folder.
+pub(super) fn require_writable(folder: &Path) -> Result<(), ReplayError> {
+    let writable = fs::create_dir_all(folder).and_then(|()| temporary_beside(&folder.join("report.json")));
+    writable.map(drop).map_err(|source| ReplayError::Write { path: folder.into(), source })
+}
+
 fn temporary_beside(path: &Path) -> std::io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".").suffix(".tmp");

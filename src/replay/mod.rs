@@ -21,7 +21,7 @@ use bevy::time::TimeUpdateStrategy;
 use crate::clock::WeatheringClock;
 use crate::scenario::{LoadedScenario, ScenarioError, ScenarioPlugin, ScenarioStatus};
 
-pub use app::require_adapter;
+pub use app::{require_adapter, task_pools};
 pub use capture::write_png;
 pub use files::write_atomic;
 pub use maps::SurfaceMaps;
@@ -139,6 +139,9 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
     let begun = Instant::now();
     options.check()?;
     let mut run = Run::load(options)?;
+    if let Some(out) = &options.out {
+        files::require_writable(out)?;
+    }
     let loaded = begun.elapsed();
 
     let clock = *run.app.world().resource::<WeatheringClock>();

@@ -139,7 +139,7 @@ impl LoadedScenario {
                 self.positive(&format!("{field}.mesh.height"), *height, FAR)?;
                 u64::from(*segments) * u64::from(*rings) * 2
             }
-            MeshSpec::File(path) => return self.resolve(&format!("{field}.mesh"), path).map(drop),
+            MeshSpec::File(path) => return self.validate_gltf(&format!("{field}.mesh"), path),
         };
         if triangles == 0 || triangles > Scenario::MAX_TRIANGLES {
             let expected = format!("1 to {} triangles (MAX_TRIANGLES)", Scenario::MAX_TRIANGLES);

@@ -17,7 +17,7 @@ use bevy::render::{ExtractSchedule, Render, RenderApp, RenderStartup, RenderSyst
 use bevy::shader::load_shader_library;
 
 pub use maps::Overlays;
-pub use prepare::SplatStats;
+pub use prepare::{SplatStats, SurfaceBatch};
 
 /// Paints splats with a compute pass. Needs a render app; without one it does nothing and splats pile up, so leave
 /// it out there and add [`CpuOverlayPlugin`](super::CpuOverlayPlugin).

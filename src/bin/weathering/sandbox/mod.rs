@@ -7,9 +7,11 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use bevy::asset::AssetPlugin;
+use bevy::light::DirectionalLightShadowMap;
 use bevy::prelude::*;
+use bevy::render::renderer::RenderAdapterInfo;
 use bevy_weathering::WeatheringPlugins;
-use bevy_weathering::replay::require_adapter;
+use bevy_weathering::replay::{require_adapter, task_pools};
 use bevy_weathering::scenario::{Scenario, ScenarioPlugin, ScenarioStatus};
 
 use crate::cli::SandboxArgs;
@@ -36,6 +38,7 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
     let exit = App::new()
         .add_plugins(
             DefaultPlugins
+                .set(task_pools(None))
                 .set(WindowPlugin { primary_window: Some(window), ..default() })
                 .set(AssetPlugin { file_path: loaded.tree.to_string_lossy().into_owned(), ..default() }),
         )
@@ -43,9 +46,28 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
         .add_plugins(scenario)
         .insert_resource(ScreenshotFolder(arguments.out.clone()))
         .add_plugins((camera::plugin, keys::plugin))
+        .add_systems(Startup, spare_software_renderers)
         .add_systems(Update, quit_on_failure)
         .run();
     if exit.is_error() { Err("the scenario could not be shown; see above".into()) } else { Ok(()) }
+}
+
+/// Without a GPU, fluency is worth more than smooth edges.
+fn spare_software_renderers(
+    mut commands: Commands,
+    adapter: Res<RenderAdapterInfo>,
+    cameras: Query<Entity, With<Camera3d>>,
+    mut windows: Query<&mut Window>,
+) {
+    if adapter.device_type == wgpu::DeviceType::Cpu {
+        commands.insert_resource(DirectionalLightShadowMap { size: 1024 });
+        for camera in &cameras {
+            commands.entity(camera).insert(Msaa::Off);
+        }
+        for mut window in &mut windows {
+            window.resolution.set(800.0, 450.0);
+        }
+    }
 }
 
 fn quit_on_failure(status: Res<ScenarioStatus>, mut exit: MessageWriter<AppExit>) {

@@ -1,0 +1,128 @@
+//! The sandbox on a virtual screen, driven by the key presses and mouse moves a person would make.
+
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// A process that ends with the test.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+const DISPLAY: &str = ":87";
+
+/// A little scene that a software driver draws fast: a wall that a hose wets from the first moment.
+const SCENARIO: &str = r#"(
+    seconds: 600.0,
+    camera: (keys: [(eye: (0.0, 1.5, 3.0), target: (0.0, 0.0, 0.0))]),
+    materials: {"clay": (color: (0.5, 0.23, 0.13), porous: (t_fill: 0.0))},
+    surfaces: [(name: "floor", mesh: Ground(size: (4.0, 4.0), cells: (2, 2)), material: "clay",
+        maps: (map_size: 128, wrap_u: Clamp, wrap_v: Clamp))],
+    emitters: [(name: "hose", effect: "hose.effect.ron", rate: 500.0, shape: Cone(radius: 0.01), speed: 8.0,
+        spread_deg: 12.0, keys: [(position: (0.0, 1.2, 1.5), target: (0.0, 0.0, 0.0))])],
+)"#;
+
+fn xdotool(arguments: &[&str]) -> String {
+    let output = Command::new("xdotool").env("DISPLAY", DISPLAY).args(arguments).output();
+    String::from_utf8_lossy(&output.expect("xdotool runs").stdout).trim().to_owned()
+}
+
+fn wait_for<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
+    let begun = Instant::now();
+    loop {
+        if let Some(found) = found() {
+            return found;
+        }
+        assert!(begun.elapsed() < Duration::from_secs(120), "waited in vain for {what}");
+        std::thread::sleep(Duration::from_millis(100));
+    }
+}
+
+/// Presses F12 and waits for the picture.
+fn screenshot(folder: &Path, number: u32) -> image::RgbImage {
+    xdotool(&["key", "F12"]);
+    let path = folder.join(format!("screenshot_{number:03}.png"));
+    wait_for("a screenshot", || path.exists().then_some(()));
+    image::open(&path).unwrap().to_rgb8()
+}
+
+/// Mean of all bytes.
+fn brightness(picture: &image::RgbImage) -> f64 {
+    picture.as_raw().iter().map(|&byte| f64::from(byte)).sum::<f64>() / picture.as_raw().len() as f64
+}
+
+#[test]
+fn keys_pause_start_over_take_pictures_and_leave() {
+    if std::env::var_os("WEATHERING_SKIP_GPU").is_some_and(|skip| skip == "1") {
+        eprintln!("skipped: WEATHERING_SKIP_GPU=1");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    std::fs::write(folder.path().join("floor.ron"), SCENARIO).unwrap();
+    std::fs::copy(root.join("assets/effects/hose.effect.ron"), folder.path().join("hose.effect.ron"))
+        .unwrap();
+    let out = folder.path().join("pictures");
+
+    let xvfb =
+        Command::new("Xvfb").args([DISPLAY, "-screen", "0", "1280x720x24"]).stderr(Stdio::null()).spawn();
+    let _xvfb = Running(xvfb.expect("Xvfb is installed (Debian package xvfb)"));
+    wait_for("the screen", || (!xdotool(&["getmouselocation"]).is_empty()).then_some(()));
+    let mut sandbox = Running(
+        Command::new(env!("CARGO_BIN_EXE_weathering"))
+            .arg("sandbox")
+            .arg(folder.path().join("floor.ron"))
+            .arg("--out")
+            .arg(&out)
+            .env("DISPLAY", DISPLAY)
+            .env("XDG_RUNTIME_DIR", folder.path())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap(),
+    );
+    let window = wait_for("the window", || {
+        let found = xdotool(&["search", "--name", "weathering"]);
+        found.lines().next().map(str::to_owned)
+    });
+    // No window manager does it here.
+    xdotool(&["windowfocus", "--sync", &window]);
+
+    let mut number = 0;
+    let mut take = || {
+        number += 1;
+        screenshot(&out, number - 1)
+    };
+    // Time runs: no two pictures of the jet are the same.
+    wait_for("the water to run", || (take().as_raw() != take().as_raw()).then_some(()));
+    // Paused and started over: dry, and nothing moves.
+    xdotool(&["key", "space"]);
+    xdotool(&["key", "r"]);
+    let dry = wait_for("a picture that stands still", || {
+        let picture = take();
+        (picture.as_raw() == take().as_raw()).then_some(picture)
+    });
+    // Running: the floor gets dark.
+    xdotool(&["key", "space"]);
+    wait_for("the floor to get wet", || (brightness(&take()) < brightness(&dry) - 0.5).then_some(()));
+    // Started over once more: the same picture as before, to the pixel.
+    xdotool(&["key", "space"]);
+    xdotool(&["key", "r"]);
+    wait_for("the dry floor", || (take().as_raw() == dry.as_raw()).then_some(()));
+    // Dragging turns the camera.
+    xdotool(&["mousemove", "300", "200", "mousedown", "1"]);
+    for _ in 0..8 {
+        xdotool(&["mousemove_relative", "12", "4"]);
+        std::thread::sleep(Duration::from_millis(60));
+    }
+    xdotool(&["mouseup", "1"]);
+    wait_for("the camera to turn", || (take().as_raw() != dry.as_raw()).then_some(()));
+    xdotool(&["key", "Escape"]);
+    let status = wait_for("the end", || sandbox.0.try_wait().unwrap());
+    assert!(status.success(), "{status}");
+}
