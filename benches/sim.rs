@@ -15,7 +15,8 @@ use bevy_weathering::collision::SurfaceCollider;
 use bevy_weathering::effect::{EffectIndex, EffectTable, WeatherEffect};
 use bevy_weathering::overlay::{CpuOverlayPlugin, GpuOverlayPlugin, SplatQueue, TexelAreas, Weatherable};
 use bevy_weathering::particle::{Lifespan, ParticleCounts, Position, Sequence, Velocity};
-use bevy_weathering::schedule::WeatheringSystems;
+use bevy_weathering::replay::task_pools;
+use bevy_weathering::schedule::{WeatheringSystems, WeatheringTick};
 
 use crate::hoff::HoffParticle;
 use crate::scene::{self, HZ, LIFETIME};
@@ -59,7 +60,7 @@ impl Sim {
     /// The scene before its first tick, with all colliders built.
     pub fn new(Setup { rate, drag, cpu_painter }: Setup) -> Self {
         let mut app = App::new();
-        app.add_plugins(MinimalPlugins)
+        app.add_plugins(MinimalPlugins.set(task_pools(None)))
             .add_plugins((TransformPlugin, AssetPlugin::default(), MeshPlugin))
             .add_plugins(WeatheringPlugins.build().disable::<GpuOverlayPlugin>());
         if cpu_painter {
@@ -101,7 +102,7 @@ impl Sim {
     pub fn recorded(setup: Setup) -> Recorded {
         let mut sim = Self::new(setup);
         sim.app.init_resource::<Births>().add_systems(
-            FixedUpdate,
+            WeatheringTick,
             // As they left the nozzle, before their first step.
             note_births.after(WeatheringSystems::Emit).before(WeatheringSystems::Integrate),
         );
@@ -126,11 +127,10 @@ impl Sim {
         self.alive()
     }
 
-    /// The schedules of one tick and nothing else. Returns how many particles are alive.
+    /// The schedule of one tick and nothing else. Returns how many particles are alive.
     pub fn tick(&mut self) -> usize {
         let world = self.app.world_mut();
-        world.run_schedule(FixedFirst);
-        world.run_schedule(FixedUpdate);
+        world.run_schedule(WeatheringTick);
         // What `App::update` does at its end; without it the list of removed components would grow.
         world.clear_trackers();
         self.empty_queues();

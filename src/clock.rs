@@ -5,6 +5,8 @@
 
 use bevy::prelude::*;
 
+use crate::schedule::{WeatheringSystems, WeatheringTick};
+
 /// Counts fixed ticks and tells their length. Advanced once per tick, before [`WeatheringSystems::First`].
 ///
 /// The rate is a whole number of ticks per second, so that everything derived from it can be exact.
@@ -65,7 +67,7 @@ impl WeatheringClock {
     }
 }
 
-/// Adds [`WeatheringClock`] and runs `FixedUpdate` at its rate.
+/// Adds [`WeatheringClock`] and runs `FixedUpdate`, and so the ticks, at its rate.
 pub struct ClockPlugin {
     /// Ticks per second, 1..=[`WeatheringClock::MAX_HZ`].
     pub hz: u32,
@@ -82,7 +84,8 @@ impl Plugin for ClockPlugin {
         let clock = WeatheringClock::new(self.hz);
         app.insert_resource(Time::<Fixed>::from_hz(f64::from(clock.hz())))
             .insert_resource(clock)
-            .add_systems(FixedFirst, advance_clock);
+            // Every stage of a tick sees its number.
+            .add_systems(WeatheringTick, advance_clock.before(WeatheringSystems::First));
     }
 }
 

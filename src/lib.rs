@@ -25,7 +25,7 @@ pub mod prelude {
     pub use crate::material::PorousMaterial;
     pub use crate::overlay::{Weatherable, Wrap};
     pub use crate::particle::Forces;
-    pub use crate::schedule::WeatheringSystems;
+    pub use crate::schedule::{WeatheringSystems, WeatheringTick};
 }
 
 /// Everything: particles, collision, splats, wet materials. Each part can be left out or replaced.

@@ -1,17 +1,26 @@
 //! The order in which a tick happens: the only place where sets are configured.
 //!
-//! A tick runs in [`FixedUpdate`], so a frame may hold none, one or several. Each set belongs to the plugin
-//! that fills it; systems of yours order themselves against the sets:
+//! A tick is a schedule of its own, [`WeatheringTick`], that runs once in each [`FixedUpdate`]; a frame may hold none,
+//! one or several. Its stages need each other's results, so they run one after the other, on one thread; what is
+//! parallel is the loop over particles or surfaces inside a system. For a few hundred particles, handing a dozen systems
+//! to other threads would cost several times what they do.
+//!
+//! Each set belongs to the plugin that fills it; systems of yours order themselves against the sets:
 //!
 //! ```
 //! # use bevy::prelude::*;
 //! # use bevy_weathering::prelude::*;
 //! # fn count_impacts() {}
 //! # let mut app = App::new();
-//! app.add_systems(FixedUpdate, count_impacts.in_set(WeatheringSystems::Last));
+//! app.add_systems(WeatheringTick, count_impacts.in_set(WeatheringSystems::Last));
 //! ```
 
+use bevy::ecs::schedule::{ScheduleLabel, SingleThreadedExecutor};
 use bevy::prelude::*;
+
+/// The schedule of one weathering tick. Runs in [`FixedUpdate`].
+#[derive(ScheduleLabel, Debug, Clone, PartialEq, Eq, Hash)]
+pub struct WeatheringTick;
 
 /// The stages of one weathering tick, in the order they run.
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -30,12 +39,21 @@ pub enum WeatheringSystems {
     Last,
 }
 
-/// Configures [`WeatheringSystems`] and advances the clock they share.
+/// Adds [`WeatheringTick`] and configures [`WeatheringSystems`].
 pub struct WeatheringSchedulePlugin;
 
 impl Plugin for WeatheringSchedulePlugin {
     fn build(&self, app: &mut App) {
         use WeatheringSystems::*;
-        app.configure_sets(FixedUpdate, (First, Emit, Integrate, Trace, Deposit, Last).chain());
+        app.edit_schedule(WeatheringTick, |tick| {
+            tick.set_executor(SingleThreadedExecutor::new());
+        })
+        .configure_sets(WeatheringTick, (First, Emit, Integrate, Trace, Deposit, Last).chain())
+        .add_systems(FixedUpdate, run_tick);
     }
+}
+
+/// The whole tick, as one system that others in [`FixedUpdate`] can be ordered against.
+pub fn run_tick(world: &mut World) {
+    world.run_schedule(WeatheringTick);
 }

@@ -22,7 +22,8 @@ fn headless() -> App {
 
 /// Turns ambiguities into panics, in every schedule that our systems are in.
 fn refuse_ambiguities(app: &mut App) {
-    let labels: [InternedScheduleLabel; 7] = [
+    let labels: [InternedScheduleLabel; 8] = [
+        WeatheringTick.intern(),
         PreUpdate.intern(),
         Update.intern(),
         PostUpdate.intern(),
@@ -58,7 +59,7 @@ fn the_check_for_ambiguities_can_fail() {
     let mut app = headless();
     fn writes(_: ResMut<ParticleCounts>) {}
     fn writes_too(_: ResMut<ParticleCounts>) {}
-    app.add_systems(FixedUpdate, (writes, writes_too).in_set(WeatheringSystems::Last));
+    app.add_systems(WeatheringTick, (writes, writes_too).in_set(WeatheringSystems::Last));
     refuse_ambiguities(&mut app);
     app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
     app.update();

@@ -23,7 +23,7 @@ use bevy::prelude::*;
 
 use crate::effect::EffectIndex;
 use crate::particle::{RetireParticles, Sequence};
-use crate::schedule::WeatheringSystems;
+use crate::schedule::{WeatheringSystems, WeatheringTick};
 
 pub use bvh::{LocalHit, MeshBvh};
 pub use colliders::{ColliderReport, MeshColliders, NotWeatherable, SurfaceCollider};
@@ -76,7 +76,7 @@ impl Plugin for CollisionPlugin {
                     .chain(),
             )
             .add_systems(
-                FixedUpdate,
+                WeatheringTick,
                 (scene::update_collision_scene, trace_particles, trace::report_impacts)
                     .chain()
                     .in_set(WeatheringSystems::Trace)

@@ -1,5 +1,6 @@
 //! Casting what every particle moved, in parallel, with one order.
 
+use bevy::ecs::query::QueryItem;
 use bevy::prelude::*;
 use bevy::utils::Parallel;
 
@@ -20,43 +21,60 @@ pub struct ReportImpacts;
 #[derive(Message, Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceImpact(pub Impact);
 
+/// What the trace reads of a particle, and the lifespan it may end.
+type Traced = (
+    &'static Position,
+    &'static Velocity,
+    &'static mut Lifespan,
+    &'static Volume,
+    &'static Sequence,
+    &'static EffectIndex,
+);
+type TracedItem<'w, 's> = QueryItem<'w, 's, Traced>;
+
 /// Casts the segment each particle moved in this tick; what hits ends there and becomes an [`Impact`].
 pub fn trace_particles(
     clock: Res<WeatheringClock>,
     scene: Res<CollisionScene>,
     mut impacts: ResMut<Impacts>,
     mut per_thread: Local<Parallel<Vec<Impact>>>,
-    mut particles: Query<(&Position, &Velocity, &mut Lifespan, &Volume, &Sequence, &EffectIndex)>,
+    mut particles: Query<Traced>,
 ) {
     impacts.0.clear();
     if scene.is_empty() {
         return;
     }
     let tick = clock.delta_secs();
-    let found = &*per_thread;
-    particles.par_iter_mut().batching_strategy(batching(PARALLEL_BATCH)).for_each_init(
-        || found.borrow_local_mut(),
-        |found, (position, velocity, mut lifespan, volume, &sequence, &effect)| {
-            let end = position.0;
-            let start = swept_start(end, velocity.0, tick * lifespan.moving_part());
-            let Some(hit) = scene.cast(start, end) else { return };
-            lifespan.bypass_change_detection().mark_hit();
-            found.push(Impact {
-                sequence,
-                surface: hit.surface,
-                triangle: hit.triangle,
-                point: hit.point,
-                normal: hit.normal,
-                uv: hit.uv,
-                uv_per_metre: hit.uv_per_metre,
-                velocity: velocity.0,
-                effect,
-                volume_nl: volume.0,
-            });
-        },
-    );
-    for found in per_thread.iter_mut() {
-        impacts.0.append(found);
+    let trace = |found: &mut Vec<Impact>, particle: TracedItem| {
+        let (position, velocity, mut lifespan, volume, &sequence, &effect) = particle;
+        let end = position.0;
+        let start = swept_start(end, velocity.0, tick * lifespan.moving_part());
+        let Some(hit) = scene.cast(start, end) else { return };
+        lifespan.bypass_change_detection().mark_hit();
+        found.push(Impact {
+            sequence,
+            surface: hit.surface,
+            triangle: hit.triangle,
+            point: hit.point,
+            normal: hit.normal,
+            uv: hit.uv,
+            uv_per_metre: hit.uv_per_metre,
+            velocity: velocity.0,
+            effect,
+            volume_nl: volume.0,
+        });
+    };
+    if particles.iter().len() < PARALLEL_BATCH {
+        particles.iter_mut().for_each(|particle| trace(&mut impacts.0, particle));
+    } else {
+        let found = &*per_thread;
+        particles
+            .par_iter_mut()
+            .batching_strategy(batching(PARALLEL_BATCH))
+            .for_each_init(|| found.borrow_local_mut(), |found, particle| trace(found, particle));
+        for found in per_thread.iter_mut() {
+            impacts.0.append(found);
+        }
     }
     // Numbers are unique, so this order is the only one.
     impacts.0.sort_unstable_by_key(|impact| impact.sequence);

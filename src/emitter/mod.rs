@@ -12,7 +12,7 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::WeatherEffect;
-use crate::schedule::WeatheringSystems;
+use crate::schedule::{WeatheringSystems, WeatheringTick};
 
 pub use emit::{EmitterState, NewParticles, emit_particles, spawn_particles};
 
@@ -101,7 +101,7 @@ impl Plugin for EmitterPlugin {
             .init_resource::<EmissionSeed>()
             .init_resource::<NewParticles>()
             .add_systems(
-                FixedUpdate,
+                WeatheringTick,
                 (emit_particles, spawn_particles).chain().in_set(WeatheringSystems::Emit),
             );
     }

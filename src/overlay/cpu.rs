@@ -4,7 +4,7 @@ use bevy::prelude::*;
 
 use super::kernel::{axis_coverage, axis_offset, blend_over, falloff, share, slope_color, stamp_alpha};
 use super::{Splat, SplatQueue, TexelState, Weatherable, Wrap};
-use crate::schedule::WeatheringSystems;
+use crate::schedule::{WeatheringSystems, WeatheringTick};
 
 /// The maps of a surface in main memory. Rows from v = 0 on, `size` texels each.
 #[derive(Component, Debug, Clone, PartialEq, Eq)]
@@ -101,7 +101,7 @@ pub struct CpuOverlayPlugin;
 impl Plugin for CpuOverlayPlugin {
     fn build(&self, app: &mut App) {
         app.add_systems(
-            FixedUpdate,
+            WeatheringTick,
             (add_cpu_maps, paint_on_cpu)
                 .chain()
                 .in_set(WeatheringSystems::Deposit)

@@ -7,7 +7,7 @@ use super::{Splat, TexelAreas, Weatherable};
 use crate::clock::WeatheringClock;
 use crate::collision::{Impact, Impacts, SurfaceCollider};
 use crate::effect::{EffectTable, WeatherEffect};
-use crate::schedule::WeatheringSystems;
+use crate::schedule::{WeatheringSystems, WeatheringTick};
 
 /// Splats of a surface that nobody has painted yet, in the order of their impacts. A frame may hold any number of
 /// ticks: each adds its own; the painter empties it.
@@ -61,7 +61,7 @@ impl Plugin for DepositPlugin {
             .register_required_components::<Weatherable, SplatQueue>()
             .register_required_components::<Weatherable, SurfaceTotals>()
             .add_systems(PreUpdate, measure_texels)
-            .add_systems(FixedUpdate, deposit_splats.in_set(WeatheringSystems::Deposit));
+            .add_systems(WeatheringTick, deposit_splats.in_set(WeatheringSystems::Deposit));
     }
 }
 

@@ -1,5 +1,6 @@
 //! One step of motion: gravity, wind and drag.
 
+use bevy::ecs::query::QueryItem;
 use bevy::prelude::*;
 
 use super::{Forces, Lifespan, Position, Velocity};
@@ -37,13 +38,17 @@ const STANDARD_GRAVITY: f32 = 9.81;
 /// Below this many particles one thread is faster than waking others.
 const PARALLEL_BATCH: usize = 4096;
 
+/// What motion changes of a particle.
+type Moving = (&'static mut Position, &'static mut Velocity, &'static mut Lifespan, &'static EffectIndex);
+type MovingItem<'w, 's> = QueryItem<'w, 's, Moving>;
+
 /// Accelerates every particle and moves it by what is left of its tick, which is one fewer to live.
 pub fn integrate_particles(
     clock: Res<WeatheringClock>,
     forces: Res<Forces>,
     effects: Res<EffectTable>,
     mut motions: Local<Vec<Motion>>,
-    mut particles: Query<(&mut Position, &mut Velocity, &mut Lifespan, &EffectIndex)>,
+    mut particles: Query<Moving>,
 ) {
     motions.clear();
     motions.extend(effects.rows().iter().map(|row| match &row.effect {
@@ -51,18 +56,21 @@ pub fn integrate_particles(
         None => Motion::default(),
     }));
     let (motions, wind, tick) = (motions.as_slice(), forces.wind, clock.delta_secs());
-    particles.par_iter_mut().batching_strategy(super::batching(PARALLEL_BATCH)).for_each(
-        |(mut position, mut velocity, mut lifespan, effect)| {
-            // Change detection is for people who look at single particles; nobody pays for it here.
-            let position = position.bypass_change_detection();
-            let velocity = velocity.bypass_change_detection();
-            let lifespan = lifespan.bypass_change_detection();
-            lifespan.ticks_left = lifespan.ticks_left.saturating_sub(1);
-            let dt = tick * lifespan.moving_part();
-            velocity.0 = motions[usize::from(effect.0)].step(velocity.0, wind, dt);
-            position.0 += velocity.0 * dt;
-        },
-    );
+    let step = |(mut position, mut velocity, mut lifespan, effect): MovingItem| {
+        // Change detection is for people who look at single particles; nobody pays for it here.
+        let position = position.bypass_change_detection();
+        let velocity = velocity.bypass_change_detection();
+        let lifespan = lifespan.bypass_change_detection();
+        lifespan.ticks_left = lifespan.ticks_left.saturating_sub(1);
+        let dt = tick * lifespan.moving_part();
+        velocity.0 = motions[usize::from(effect.0)].step(velocity.0, wind, dt);
+        position.0 += velocity.0 * dt;
+    };
+    if particles.iter().len() < PARALLEL_BATCH {
+        particles.iter_mut().for_each(step);
+    } else {
+        particles.par_iter_mut().batching_strategy(super::batching(PARALLEL_BATCH)).for_each(step);
+    }
 }
 
 #[cfg(test)]

@@ -21,7 +21,7 @@ mod retire;
 use bevy::prelude::*;
 
 use crate::effect::EffectIndex;
-use crate::schedule::WeatheringSystems;
+use crate::schedule::{WeatheringSystems, WeatheringTick};
 
 pub use draw::{ParticleDrawPlugin, ParticleMesh};
 pub use integrate::integrate_particles;
@@ -152,9 +152,9 @@ impl Plugin for ParticlePlugin {
             .init_resource::<ParticleConfig>()
             .init_resource::<ParticleCounts>()
             .init_resource::<Retired>()
-            .configure_sets(FixedUpdate, RetireParticles.in_set(WeatheringSystems::Trace))
+            .configure_sets(WeatheringTick, RetireParticles.in_set(WeatheringSystems::Trace))
             .add_systems(
-                FixedUpdate,
+                WeatheringTick,
                 (
                     integrate_particles.in_set(WeatheringSystems::Integrate),
                     (collect_dead, retire_particles).chain().in_set(RetireParticles),

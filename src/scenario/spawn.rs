@@ -16,7 +16,7 @@ use crate::effect::{EffectTable, WeatherEffect};
 use crate::emitter::{EmissionSeed, Emitter};
 use crate::overlay::TexelAreas;
 use crate::particle::{Forces, ParticleConfig};
-use crate::schedule::WeatheringSystems;
+use crate::schedule::{WeatheringSystems, WeatheringTick};
 
 /// Spawns a scenario and runs it once everything is loaded. Virtual time stands still until then.
 ///
@@ -76,7 +76,7 @@ impl Plugin for ScenarioPlugin {
             .init_resource::<Digest>()
             .add_systems(PreUpdate, watch_loading.run_if(is_loading))
             .add_systems(
-                FixedUpdate,
+                WeatheringTick,
                 (
                     // Emitters stand where they should before they emit.
                     move_emitters.in_set(WeatheringSystems::First),
