@@ -75,6 +75,7 @@ fn fragment(in: VertexOutput, @builtin(front_facing) is_front: bool) -> Fragment
             porous.k_w,
             select(0u, 1u, has_flag(FLAG_SQRT_K)),
         );
+        surface.k_s = porous.k_s;
         surface.tau = wetness;
         surface.solid = has_flag(FLAG_SOLID);
         surface.blinn_phong = has_flag(FLAG_BLINN_PHONG);

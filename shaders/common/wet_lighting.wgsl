@@ -40,6 +40,8 @@ const AMBIENT_COSINE: f32 = 0.6666667;
 // The porous side of a surface point.
 struct WetSurface {
     porous: PorousParams,
+    // Part of the light that the dry surface scatters back.
+    k_s: f32,
     // How wet, 0..=1.
     tau: f32,
     // The base colour is the solid's, not the dry porous look.
@@ -54,8 +56,6 @@ struct Point {
     // Colours before the post-process.
     diffuse: vec3<f32>,
     reflectance: vec3<f32>,
-    // ks of the post-process: mean reflectance of the solid.
-    ks: f32,
     // The water's layer.
     water: lighting::LayerLightingInput,
 }
@@ -63,11 +63,11 @@ struct Point {
 // Sets the coefficients of the base BRDF for light from a direction at cosine `n_dot_s`; returns the water's part.
 fn wet_coefficients(point: Point, input: ptr<function, lighting::LightingInput>, n_dot_s: f32) -> f32 {
     let n_dot_v = (*input).layers[LAYER_BASE].NdotV;
-    let terms = hnat_terms(point.surface.porous, point.ks, point.diffuse, n_dot_s, n_dot_v,
+    let terms = hnat_terms(point.surface.porous, point.surface.k_s, point.diffuse, n_dot_s, n_dot_v,
         acos(clamp(n_dot_s, 0.0, 1.0)), acos(clamp(n_dot_v, 0.0, 1.0)), point.surface.tau);
     if point.surface.solid {
         (*input).diffuse_color = terms.kd_wet;
-        (*input).F0_dielectric = point.reflectance * (terms.ks_dry / max(point.ks, 1e-6));
+        (*input).F0_dielectric = point.reflectance * (terms.ks_dry / max(point.surface.k_s, 1e-6));
     } else {
         (*input).diffuse_color = point.diffuse * terms.kd_wet / max(terms.kd_dry, vec3(1e-6));
     }
@@ -212,7 +212,6 @@ fn apply_wet_lighting(in: pbr_types::PbrInput, surface: WetSurface) -> vec4<f32>
     point.surface = surface;
     point.diffuse = input.diffuse_color;
     point.reflectance = input.F0_dielectric;
-    point.ks = dot(input.F0_dielectric, vec3(1.0 / 3.0));
     point.water = water_layer(in, surface.tau);
 
     let view = &view_bindings::view;

@@ -12,6 +12,8 @@ struct PorousUniform {
     s_p: f32,
     // RMS slope, 0..=1.
     m: f32,
+    // Part of the light that the dry surface scatters back, 0..=1.
+    k_s: f32,
     // Strength of the water's own reflection, 0..=1.
     k_w: f32,
     // Seconds from the first water until a texel looks wet.

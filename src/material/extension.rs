@@ -47,6 +47,8 @@ pub struct PorousUniform {
     pub s_p: f32,
     /// [`PorousMaterial::m`].
     pub m: f32,
+    /// [`PorousMaterial::k_s`].
+    pub k_s: f32,
     /// [`PorousMaterial::k_w`].
     pub k_w: f32,
     /// [`PorousMaterial::t_fill`], seconds.
@@ -79,6 +81,7 @@ impl PorousUniform {
             alpha_poro: unit(porous.alpha_poro),
             s_p: unit(porous.s_p),
             m: unit(porous.m),
+            k_s: unit(porous.k_s),
             k_w: unit(porous.k_w),
             t_fill: porous.t_fill.max(0.0),
             // 1 mm on 1 mm² is 1 µl.

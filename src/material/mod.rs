@@ -35,11 +35,14 @@ pub use extension::{PorousExtension, PorousUniform, WeatheredMaterial};
 pub struct PorousMaterial {
     /// α_poro, the part of the surface that is pores; 0 (glazed) to 1.
     pub alpha_poro: f32,
-    /// s_p, shape of a pore from deep (near 0) to shallow (1). Deep pores are dark when dry already, so .02 to .15
-    /// show wetness best.
+    /// s_p, shape of a pore from deep (near 0) to shallow (1). Deep pores are dark when dry already, so .005 to
+    /// .15 show wetness best.
     pub s_p: f32,
     /// m, RMS slope of the surface between pores, 0..=1.
     pub m: f32,
+    /// k_s, the part of the light that the dry surface scatters back without entering it, 0..=1. What of it falls
+    /// into pores is a whitish veil over the dry colour, which water takes away: the more, the more saturated wet.
+    pub k_s: f32,
     /// k_w, strength of the water's own reflection, 0..=1.
     pub k_w: f32,
     /// Uses k = sqrt(2 m²/π) (Schlick 1994) instead of k = 2 m²/π as printed.
@@ -79,8 +82,9 @@ impl Default for PorousMaterial {
     fn default() -> Self {
         Self {
             alpha_poro: 0.5,
-            s_p: 0.06,
+            s_p: 0.02,
             m: 0.35,
+            k_s: 0.04,
             k_w: 0.9,
             sqrt_k: false,
             t_fill: 0.4,

@@ -82,6 +82,7 @@ impl LoadedScenario {
             ("porous.alpha_poro", porous.alpha_poro),
             ("porous.s_p", porous.s_p),
             ("porous.m", porous.m),
+            ("porous.k_s", porous.k_s),
             ("porous.k_w", porous.k_w),
         ] {
             self.not_negative(&format!("{field}.{name}"), value, 1.0)?;
