@@ -7,5 +7,5 @@ source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 command -v Xvfb >/dev/null || install xvfb
 command -v xdotool >/dev/null || install xdotool
 
-cargo test --release --all-targets "$@"
+cargo test --release --lib --bins --tests --examples "$@"
 cargo test --release --doc "$@"

@@ -39,6 +39,10 @@ pub enum WeatheringSystems {
     Last,
 }
 
+/// The last step of [`WeatheringSystems::Trace`]: despawning what hit or expired.
+#[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct RetireParticles;
+
 /// Adds [`WeatheringTick`] and configures [`WeatheringSystems`].
 pub struct WeatheringSchedulePlugin;
 
@@ -49,6 +53,7 @@ impl Plugin for WeatheringSchedulePlugin {
             tick.set_executor(SingleThreadedExecutor::new());
         })
         .configure_sets(WeatheringTick, (First, Emit, Integrate, Trace, Deposit, Last).chain())
+        .configure_sets(WeatheringTick, RetireParticles.in_set(Trace))
         .add_systems(FixedUpdate, run_tick);
     }
 }

@@ -22,8 +22,8 @@ mod triangles;
 use bevy::prelude::*;
 
 use crate::effect::EffectIndex;
-use crate::particle::{RetireParticles, Sequence};
-use crate::schedule::{WeatheringSystems, WeatheringTick};
+use crate::particle::Sequence;
+use crate::schedule::{RetireParticles, WeatheringSystems, WeatheringTick};
 
 pub use bvh::{LocalHit, MeshBvh};
 pub use colliders::{ColliderReport, MeshColliders, NotWeatherable, SurfaceCollider};

@@ -187,6 +187,32 @@ mod tests {
     }
 
     #[test]
+    fn hits_set_the_wet_time_of_their_texels_and_later_ones_leave_it() {
+        bevy::tasks::ComputeTaskPool::get_or_init(default);
+        let mut world = World::new();
+        let surface = world.spawn((maps(Wrap::Repeat), SplatQueue::default())).id();
+        let mut schedule = Schedule::default();
+        schedule.add_systems(paint_on_cpu);
+        let mut hit = |world: &mut World, center, tick| {
+            let mut queue = world.get_mut::<SplatQueue>(surface).unwrap();
+            queue.push(Splat { tick, ..splat(center) });
+            schedule.run(world);
+            assert!(world.get::<SplatQueue>(surface).unwrap().is_empty());
+        };
+        let texel =
+            |world: &World, x: usize, y: usize| world.get::<CpuMaps>(surface).unwrap().state[y * 64 + x];
+        hit(&mut world, [20 * 256, 20 * 256], 3);
+        let first = texel(&world, 20, 20);
+        assert_eq!(first.wet_since, 3);
+        assert_eq!(texel(&world, 40, 40), TexelState::default());
+        hit(&mut world, [20 * 256, 20 * 256], 8);
+        hit(&mut world, [40 * 256, 40 * 256], 9);
+        let second = texel(&world, 20, 20);
+        assert_eq!((second.wet_since, second.water_nl), (3, 2 * first.water_nl));
+        assert_eq!(texel(&world, 40, 40).wet_since, 9);
+    }
+
+    #[test]
     fn splitting_a_batch_changes_nothing() {
         let splats: Vec<Splat> = (0..40).map(|i| splat([i * 311 % 16_384, i * 977 % 16_384])).collect();
         let (mut at_once, mut split) = (maps(Wrap::Repeat), maps(Wrap::Repeat));

@@ -65,12 +65,16 @@ impl Plugin for DepositPlugin {
     }
 }
 
-/// Measures the texels of a surface when it gets its collider.
+/// Measures the texels of a surface when it gets a collider or maps of another size. A scale that changes later is not
+/// followed: the water would be spread anew.
 pub(super) fn measure_texels(
     mut commands: Commands,
-    new: Query<(Entity, &Weatherable, &SurfaceCollider, &GlobalTransform), Without<TexelAreas>>,
+    changed: Query<
+        (Entity, &Weatherable, &SurfaceCollider, &GlobalTransform),
+        Or<(Changed<Weatherable>, Changed<SurfaceCollider>)>,
+    >,
 ) {
-    for (entity, surface, collider, transform) in &new {
+    for (entity, surface, collider, transform) in &changed {
         let areas = TexelAreas::new(collider.0.triangles(), &transform.affine(), surface.texels());
         commands.entity(entity).insert(areas);
     }

@@ -21,7 +21,7 @@ mod retire;
 use bevy::prelude::*;
 
 use crate::effect::EffectIndex;
-use crate::schedule::{WeatheringSystems, WeatheringTick};
+use crate::schedule::{RetireParticles, WeatheringSystems, WeatheringTick};
 
 pub use draw::{ParticleDrawPlugin, ParticleMesh};
 pub use integrate::integrate_particles;
@@ -152,7 +152,6 @@ impl Plugin for ParticlePlugin {
             .init_resource::<ParticleConfig>()
             .init_resource::<ParticleCounts>()
             .init_resource::<Retired>()
-            .configure_sets(WeatheringTick, RetireParticles.in_set(WeatheringSystems::Trace))
             .add_systems(
                 WeatheringTick,
                 (
@@ -167,7 +166,3 @@ impl Plugin for ParticlePlugin {
 pub(crate) fn batching(min: usize) -> bevy::ecs::batching::BatchingStrategy {
     bevy::ecs::batching::BatchingStrategy::new().min_batch_size(min)
 }
-
-/// The last step of [`WeatheringSystems::Trace`]: despawning what hit or expired.
-#[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct RetireParticles;

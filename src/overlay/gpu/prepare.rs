@@ -101,6 +101,10 @@ pub(super) fn extract_splats(
             surfaces.len() - 1
         });
         let waiting = &mut surfaces[index];
+        if waiting.overlays.state != overlays.state {
+            // New maps: what was meant for the old ones is gone with them.
+            waiting.splats.clear();
+        }
         (waiting.surface, waiting.overlays) = (*surface, overlays.clone());
         queue.drain_into(&mut waiting.splats);
     }
@@ -262,6 +266,20 @@ mod tests {
         }
         // Nothing was painted: all of it still waits, in order.
         assert_eq!(pending(&render), [0, 1, 2, 3, 4, 5, 6]);
+    }
+
+    #[test]
+    fn new_maps_get_nothing_that_was_meant_for_the_old() {
+        let (mut render, surface) = worlds();
+        let mut schedule = Schedule::default();
+        schedule.add_systems(extract_splats);
+        push(&mut render, surface, 0..3);
+        schedule.run(&mut render);
+        let other = Handle::Uuid(bevy::asset::uuid::Uuid::from_u128(7), std::marker::PhantomData);
+        render.resource_mut::<MainWorld>().get_mut::<Overlays>(surface).unwrap().state = other;
+        push(&mut render, surface, 3..4);
+        schedule.run(&mut render);
+        assert_eq!(pending(&render), [3]);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 mod camera;
 mod keys;
+mod title;
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -30,11 +31,7 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
         return Err("no display: DISPLAY is not set; use `weathering replay`, or start one (Xvfb)".into());
     }
     let scenario = ScenarioPlugin::new(loaded.clone(), true)?;
-    let window = Window {
-        title: format!("weathering - {}", arguments.file.display()),
-        resolution: (1280, 720).into(),
-        ..default()
-    };
+    let window = Window { title: "weathering".into(), resolution: (1280, 720).into(), ..default() };
     let exit = App::new()
         .add_plugins(
             DefaultPlugins
@@ -45,7 +42,8 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
         .add_plugins(WeatheringPlugins)
         .add_plugins(scenario)
         .insert_resource(ScreenshotFolder(arguments.out.clone()))
-        .add_plugins((camera::plugin, keys::plugin))
+        .insert_resource(title::ScenarioName(arguments.file.display().to_string()))
+        .add_plugins((camera::plugin, keys::plugin, title::plugin))
         .add_systems(Startup, spare_software_renderers)
         .add_systems(Update, quit_on_failure)
         .run();
