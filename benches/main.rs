@@ -7,6 +7,7 @@
 //! | [`live`] | the highest emission that leaves a 60 Hz tick inside its 16.67 ms | the budget |
 //! | [`far`] | a particle with nothing near it | a loop over two arrays |
 //! | [`cast`] | closest hits of short segments, from 1,000 to 1,000,000 triangles | [`hoff`] |
+//! | [`shading`] | a frame full of a weathered surface | the same frame of a `StandardMaterial` |
 //! | [`splat`] | painting on the CPU, and sorting for the GPU | each other |
 //!
 //! `cargo bench --bench main` runs all of them, `cargo bench --bench main -- cast` one. Results, predictions
@@ -22,6 +23,7 @@ mod hoff;
 mod live;
 mod measure;
 mod scene;
+mod shading;
 mod sim;
 mod splat;
 mod tick;
@@ -49,6 +51,7 @@ criterion_group! {
     name = benches;
     config = config();
     // Memory first, while nothing has been given back to the allocator that it could hand out again.
-    targets = bytes::bench, baseline_is_right, tick::bench, live::bench, far::bench, cast::bench, splat::bench
+    targets = bytes::bench, baseline_is_right, tick::bench, live::bench, far::bench, cast::bench, splat::bench,
+        shading::bench
 }
 criterion_main!(benches);

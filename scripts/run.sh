@@ -5,12 +5,13 @@ set -euo pipefail
 invoked_from="${PWD}"
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
+[ -z "${DISPLAY:-}" ] || window_libraries
 cargo build --release --bin weathering
 weathering="${CARGO_TARGET_DIR}/release/weathering"
 if [ "$#" -gt 0 ]; then
     cd "${invoked_from}"
     exec "${weathering}" "$@"
-elif [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
+elif [ -n "${DISPLAY:-}" ]; then
     exec "${weathering}" sandbox assets/scenarios/hose.ron
 else
     exec "${weathering}" replay assets/scenarios/hose.ron --out out --fps 12

@@ -34,4 +34,21 @@ command -v cc >/dev/null || install gcc libc6-dev
 if ! ls /usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json >/dev/null 2>&1 && [ -z "${VK_ICD_FILENAMES:-}" ]; then
     install mesa-vulkan-drivers
 fi
-ldconfig -p 2>/dev/null | grep -q libvulkan.so.1 || install libvulkan1
+# has_library NAME. The loader's list comes first into a variable: `grep -q` would leave a pipe that `pipefail` sees break.
+has_library() {
+    local libraries
+    libraries="$(PATH="${PATH}:/sbin:/usr/sbin" ldconfig -p 2>/dev/null || true)"
+    [ -z "${libraries##*"$1"*}" ]
+}
+has_library libvulkan.so.1 || install libvulkan1
+
+# window_libraries: what opening a window loads at run time.
+window_libraries() {
+    local library
+    for library in libX11-xcb.so.1 libXcursor.so.1 libXi.so.6 libxkbcommon-x11.so.0; do
+        if ! has_library "${library}"; then
+            install libx11-6 libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0
+            return
+        fi
+    done
+}

@@ -81,11 +81,17 @@ impl Default for ClockPlugin {
 
 impl Plugin for ClockPlugin {
     fn build(&self, app: &mut App) {
+        self.insert_clock(app);
+        // Every stage of a tick sees its number.
+        app.add_systems(WeatheringTick, advance_clock.before(WeatheringSystems::First));
+    }
+}
+
+impl ClockPlugin {
+    /// Sets the clock of an app that has the plugin already.
+    pub(crate) fn insert_clock(&self, app: &mut App) {
         let clock = WeatheringClock::new(self.hz);
-        app.insert_resource(Time::<Fixed>::from_hz(f64::from(clock.hz())))
-            .insert_resource(clock)
-            // Every stage of a tick sees its number.
-            .add_systems(WeatheringTick, advance_clock.before(WeatheringSystems::First));
+        app.insert_resource(Time::<Fixed>::from_hz(f64::from(clock.hz()))).insert_resource(clock);
     }
 }
 

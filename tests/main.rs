@@ -9,7 +9,7 @@ mod common;
 /// The real shaders on a real driver, against their twins.
 mod gpu {
     /// Small apps that render without a window.
-    mod app;
+    pub mod app;
     /// Ticks and frames.
     mod frames;
     mod harness;

@@ -206,6 +206,26 @@ fn the_number_of_threads_changes_nothing() {
     assert_eq!(one, report(8));
 }
 
+/// As many as it takes for every parallel loop to be split.
+#[test]
+fn the_number_of_threads_changes_nothing_for_a_crowd() {
+    let tree = Tree::new();
+    let crowd = TAP
+        .replace("rate: 200.0", "rate: 60000.0")
+        .replace("max_particles: 1000", "max_particles: 100000")
+        .replace("position: (0.0, 0.2, 0.0)", "position: (0.0, 2.0, 0.0)");
+    let path = tree.path("tree/scenarios/crowd.ron");
+    fs::write(&path, crowd).unwrap();
+    let report = |threads: u32| {
+        without_timing(run(&mut replay(&path, &format!("--no-render --threads {threads}"))).report())
+    };
+    let one = report(1);
+    let alive = number(&one["particles"]["alive"]);
+    assert!(alive > 20_000.0 && number(&one["particles"]["hit"]) > 10_000.0, "{one}");
+    assert_eq!(one, report(2));
+    assert_eq!(one, report(8));
+}
+
 #[test]
 fn another_seed_is_another_run() {
     let report = |options: &str| run(&mut replay(HOSE, options)).report();

@@ -3,14 +3,17 @@
 use bevy::asset::AssetPlugin;
 use bevy::ecs::schedule::{InternedScheduleLabel, LogLevel, ScheduleBuildSettings, ScheduleLabel, Schedules};
 use bevy::mesh::MeshPlugin;
+use bevy::pbr::MaterialPlugin;
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 use bevy_weathering::WeatheringPlugins;
 use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::collision::{SurfaceCollider, SurfaceImpact};
+use bevy_weathering::material::WeatheredMaterial;
 use bevy_weathering::overlay::{CpuMaps, CpuOverlayPlugin, SurfaceTotals};
-use bevy_weathering::particle::ParticleCounts;
+use bevy_weathering::particle::{ParticleCounts, Position, integrate_particles};
 use bevy_weathering::prelude::*;
+use bevy_weathering::scenario::{Scenario, ScenarioPlugin};
 
 fn headless() -> App {
     let mut app = App::new();
@@ -20,10 +23,11 @@ fn headless() -> App {
     app
 }
 
-/// Turns ambiguities into panics, in every schedule that our systems are in.
-fn refuse_ambiguities(app: &mut App) {
-    let labels: [InternedScheduleLabel; 8] = [
+/// Every schedule that our systems are in.
+fn our_schedules() -> [InternedScheduleLabel; 9] {
+    [
         WeatheringTick.intern(),
+        Startup.intern(),
         PreUpdate.intern(),
         Update.intern(),
         PostUpdate.intern(),
@@ -31,9 +35,13 @@ fn refuse_ambiguities(app: &mut App) {
         FixedPreUpdate.intern(),
         FixedUpdate.intern(),
         FixedPostUpdate.intern(),
-    ];
+    ]
+}
+
+/// Turns ambiguities into panics.
+fn refuse_ambiguities(app: &mut App) {
     let mut schedules = app.world_mut().resource_mut::<Schedules>();
-    for label in labels {
+    for label in our_schedules() {
         schedules
             .entry(label)
             .set_build_settings(ScheduleBuildSettings { ambiguity_detection: LogLevel::Error, ..default() });
@@ -51,6 +59,59 @@ fn no_two_systems_are_ambiguous() {
         app.update();
     }
     assert!(app.world().resource::<WeatheringClock>().tick() >= 2, "the schedules ran");
+}
+
+/// Pairs of systems, by schedule, whose order nobody has settled, and what they disagree about.
+fn ambiguities(app: &mut App) -> Vec<(InternedScheduleLabel, Vec<String>)> {
+    // Conflicts are found when a schedule is built.
+    let conflicts = |world: &mut World, schedule: &mut Schedule| {
+        schedule.initialize(world).unwrap();
+        let mut pairs: Vec<String> = schedule
+            .graph()
+            .conflicting_systems()
+            .0
+            .iter()
+            .map(|(_, _, on)| {
+                let info = |&id| world.components().get_info(id).and_then(|info| info.type_id());
+                format!("{:?}", on.iter().map(info).collect::<Vec<_>>())
+            })
+            .collect();
+        pairs.sort();
+        pairs
+    };
+    // Not every app has all schedules.
+    let of = |label| Some((label, app.world_mut().try_schedule_scope(label, conflicts).ok()?));
+    our_schedules().into_iter().filter_map(of).collect()
+}
+
+/// Systems have no names in a build like this one, so what Bevy leaves open by itself is counted and taken off.
+#[test]
+fn no_system_is_ambiguous_beside_all_of_bevy() {
+    let Some(mut bare) = crate::gpu::app::bare_app() else { return };
+    // Bevy's systems for our material are Bevy's.
+    bare.add_plugins(MaterialPlugin::<WeatheredMaterial>::default());
+    bare.finish();
+    bare.cleanup();
+    let theirs = ambiguities(&mut bare);
+
+    let mut app = crate::gpu::app::unfinished_app().unwrap();
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/scenarios/vase.ron");
+    let scenario = Scenario::load(&file).unwrap();
+    app.add_plugins(ScenarioPlugin::new(scenario, true).unwrap());
+    app.finish();
+    app.cleanup();
+    let all = ambiguities(&mut app);
+    assert!(all.len() > 5, "{}", all.len());
+    for (label, pairs) in &all {
+        let without_us = theirs.iter().find(|(other, _)| other == label).map_or(0, |(_, pairs)| pairs.len());
+        assert_eq!(pairs.len(), without_us, "{label:?}: {pairs:#?}");
+    }
+
+    // The count does rise.
+    fn pushes(_: Query<&mut Position>) {}
+    app.add_systems(PostUpdate, (pushes, integrate_particles));
+    let count = |all: &[(_, Vec<String>)]| all.iter().map(|(_, pairs)| pairs.len()).sum::<usize>();
+    assert!(count(&ambiguities(&mut app)) > count(&all));
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The sandbox on a virtual screen, driven by the key presses and mouse moves a person would make.
 
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -14,8 +15,6 @@ impl Drop for Running {
     }
 }
 
-const DISPLAY: &str = ":87";
-
 /// A little scene that a software driver draws fast: a wall that a hose wets from the first moment.
 const SCENARIO: &str = r#"(
     seconds: 600.0,
@@ -27,8 +26,22 @@ const SCENARIO: &str = r#"(
         spread_deg: 12.0, keys: [(position: (0.0, 1.2, 1.5), target: (0.0, 0.0, 0.0))])],
 )"#;
 
-fn xdotool(arguments: &[&str]) -> String {
-    let output = Command::new("xdotool").env("DISPLAY", DISPLAY).args(arguments).output();
+/// A virtual screen of its own; the server chooses the number.
+fn start_screen() -> (Running, String) {
+    let mut server = Command::new("Xvfb");
+    server
+        .args(["-displayfd", "1", "-screen", "0", "1280x720x24"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null());
+    let mut server = Running(server.spawn().expect("Xvfb is installed (Debian package xvfb)"));
+    let mut number = String::new();
+    let output = server.0.stdout.take().expect("piped");
+    BufReader::new(output).read_line(&mut number).expect("the server says its number");
+    (server, format!(":{}", number.trim()))
+}
+
+fn xdotool(display: &str, arguments: &[&str]) -> String {
+    let output = Command::new("xdotool").env("DISPLAY", display).args(arguments).output();
     String::from_utf8_lossy(&output.expect("xdotool runs").stdout).trim().to_owned()
 }
 
@@ -44,8 +57,8 @@ fn wait_for<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
 }
 
 /// Presses F12 and waits for the picture.
-fn screenshot(folder: &Path, number: u32) -> image::RgbImage {
-    xdotool(&["key", "F12"]);
+fn screenshot(display: &str, folder: &Path, number: u32) -> image::RgbImage {
+    xdotool(display, &["key", "F12"]);
     let path = folder.join(format!("screenshot_{number:03}.png"));
     wait_for("a screenshot", || path.exists().then_some(()));
     image::open(&path).unwrap().to_rgb8()
@@ -80,17 +93,15 @@ fn keys_pause_start_over_take_pictures_and_leave() {
         .unwrap();
     let out = folder.path().join("pictures");
 
-    let xvfb =
-        Command::new("Xvfb").args([DISPLAY, "-screen", "0", "1280x720x24"]).stderr(Stdio::null()).spawn();
-    let _xvfb = Running(xvfb.expect("Xvfb is installed (Debian package xvfb)"));
-    wait_for("the screen", || (!xdotool(&["getmouselocation"]).is_empty()).then_some(()));
+    let (_server, display) = start_screen();
+    let xdotool = |arguments: &[&str]| xdotool(&display, arguments);
     let mut sandbox = Running(
         Command::new(env!("CARGO_BIN_EXE_weathering"))
             .arg("sandbox")
             .arg(folder.path().join("floor.ron"))
             .arg("--out")
             .arg(&out)
-            .env("DISPLAY", DISPLAY)
+            .env("DISPLAY", &display)
             .env("XDG_RUNTIME_DIR", folder.path())
             .stdout(Stdio::null())
             .stderr(Stdio::null())
@@ -113,7 +124,7 @@ fn keys_pause_start_over_take_pictures_and_leave() {
     let mut number = 0;
     let mut take = || {
         number += 1;
-        screenshot(&out, number - 1)
+        screenshot(&display, &out, number - 1)
     };
     // Time runs: no two pictures of the jet are the same.
     wait_for("the water to run", || (take().as_raw() != take().as_raw()).then_some(()));

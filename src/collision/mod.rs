@@ -60,6 +60,10 @@ pub struct Impact {
 #[derive(Resource, Debug, Default)]
 pub struct Impacts(pub Vec<Impact>);
 
+/// In `PreUpdate`: meshes become colliders.
+#[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct BuildColliders;
+
 /// Builds colliders and traces particles.
 pub struct CollisionPlugin;
 
@@ -70,10 +74,12 @@ impl Plugin for CollisionPlugin {
             .init_resource::<Impacts>()
             .add_message::<SurfaceImpact>()
             .register_type::<ReportImpacts>()
+            .add_observer(colliders::release_surface)
             .add_systems(
                 PreUpdate,
-                (colliders::forget_changed_meshes, colliders::build_colliders, colliders::attach_colliders)
-                    .chain(),
+                (colliders::watch_meshes, colliders::build_colliders, colliders::attach_colliders)
+                    .chain()
+                    .in_set(BuildColliders),
             )
             .add_systems(
                 WeatheringTick,

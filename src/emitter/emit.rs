@@ -71,17 +71,24 @@ pub fn emit_particles(
     streams: Query<(&Emitter, Entity)>,
 ) {
     order.clear();
-    order.extend(streams.iter().filter(|(e, _)| e.enabled && e.rate > 0.0).map(|(e, id)| (e.stream, id)));
+    order.extend(streams.iter().map(|(emitter, id)| (emitter.stream, id)));
     order.sort_unstable();
 
     let NewParticles { particles, next_sequence } = &mut *new;
-    for &(_, entity) in order.iter() {
+    let (mut stream, mut twins) = (None, 0u32);
+    for &(number, entity) in order.iter() {
+        twins = if stream.replace(number) == Some(number) { twins + 1 } else { 0 };
         let Ok((emitter, mut state, transform)) = emitters.get_mut(entity) else { continue };
+        if !emitter.enabled || emitter.rate <= 0.0 {
+            continue;
+        }
         let Some(index) = effects.index_of(&emitter.effect) else { continue };
         let Some(effect) = effects.get(index) else { continue };
 
         let state = &mut *state;
-        let mut rng = state.rng.take().unwrap_or_else(|| Pcg32::new(seed.0, u64::from(emitter.stream)));
+        // Emitters that share a number do not send the same particles.
+        let own_stream = || Pcg32::new(seed.0, u64::from(number) | u64::from(twins) << 32);
+        let mut rng = state.rng.take().unwrap_or_else(own_stream);
         let (due, first, interval) = state.due(emitter.rate, clock.hz());
         let room = u64::from(config.max_alive).saturating_sub(counts.alive + particles.len() as u64);
         let count = u64::from(due).min(room) as u32;

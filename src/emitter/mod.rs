@@ -35,7 +35,8 @@ pub struct Emitter {
     ///
     /// [`Lifespan::MAX_TICKS`]: crate::particle::Lifespan::MAX_TICKS
     pub lifetime: f32,
-    /// Number of its random stream. Emitters take their turns in this order; give each its own.
+    /// Number of its random stream. Emitters take their turns in this order; of those with the same, in the
+    /// order of their entities, so give each its own where a run must not depend on that.
     pub stream: u32,
     /// Switches it off without losing what it owes.
     pub enabled: bool,

@@ -33,6 +33,19 @@ pub(super) fn exchange_materials(
     }
 }
 
+/// Gives a surface that is not [`Weatherable`] any more its dry material back.
+pub(super) fn release_surface(
+    removed: On<Remove, Weatherable>,
+    mut commands: Commands,
+    dry: Query<&DryMaterial>,
+) {
+    let Ok(material) = dry.get(removed.entity) else { return };
+    commands
+        .entity(removed.entity)
+        .try_remove::<(MeshMaterial3d<WeatheredMaterial>, DryMaterial)>()
+        .try_insert(MeshMaterial3d(material.0.clone()));
+}
+
 /// Copies edits of a dry material into the weathered ones made from it.
 pub(super) fn follow_dry_materials(
     mut events: MessageReader<AssetEvent<StandardMaterial>>,

@@ -2,7 +2,7 @@
 //!
 //! A weathered surface is drawn with [`WeatheredMaterial`]: Bevy's `StandardMaterial`, extended. The extension reads
 //! the surface's [maps](crate::overlay), works out how wet each texel is at this moment, and changes the diffuse
-//! and specular coefficients *per light* by the porous BRDF post-process of Hnat et al. ([`hnat`]), since masking
+//! and specular coefficients *per light* by the porous BRDF post-process of Hnat et al. ([`hnat`](models::hnat)), since masking
 //! and pore depth depend on where the light stands. A separate, nearly mirror-like lobe is the water in the pores. Lights,
 //! shadows, clusters, fog and the environment map are Bevy's own.
 //!
@@ -14,9 +14,10 @@
 mod clock;
 mod exchange;
 mod extension;
-pub mod hnat;
+pub mod film;
+pub mod models;
 
-use bevy::asset::embedded_asset;
+use bevy::asset::{AssetEventSystems, embedded_asset};
 use bevy::pbr::MaterialPlugin;
 use bevy::prelude::*;
 use bevy::render::RenderApp;
@@ -110,6 +111,7 @@ impl Plugin for PorousMaterialPlugin {
         embedded_asset!(app, "../../shaders/weathered.wgsl");
         app.add_plugins(MaterialPlugin::<WeatheredMaterial>::default())
             .add_plugins(clock::plugin)
+            .add_observer(exchange::release_surface)
             .add_systems(
                 PostUpdate,
                 (
@@ -117,7 +119,9 @@ impl Plugin for PorousMaterialPlugin {
                     exchange::follow_dry_materials,
                     exchange::follow_porous_materials,
                 )
-                    .chain(),
+                    .chain()
+                    // What is added here is drawn in this frame.
+                    .before(AssetEventSystems),
             );
     }
 }

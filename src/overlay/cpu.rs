@@ -102,17 +102,27 @@ impl Plugin for CpuOverlayPlugin {
     fn build(&self, app: &mut App) {
         app.add_systems(
             WeatheringTick,
-            (add_cpu_maps, paint_on_cpu)
-                .chain()
-                .in_set(WeatheringSystems::Deposit)
-                .after(super::deposit_splats),
+            (
+                add_cpu_maps.before(super::deposit_splats),
+                paint_on_cpu.after(super::deposit_splats).after(add_cpu_maps),
+            )
+                .in_set(WeatheringSystems::Deposit),
         );
     }
 }
 
-fn add_cpu_maps(mut commands: Commands, new: Query<(Entity, &Weatherable), Without<CpuMaps>>) {
-    for (entity, surface) in &new {
-        commands.entity(entity).insert(CpuMaps::new(surface));
+/// Gives new surfaces their maps, and new ones when their size or edges change.
+fn add_cpu_maps(
+    mut commands: Commands,
+    mut changed: Query<(Entity, &Weatherable, Option<&CpuMaps>, &mut SplatQueue), Changed<Weatherable>>,
+) {
+    for (entity, surface, maps, mut queue) in &mut changed {
+        if maps.is_none_or(|maps| (maps.size, maps.wrap) != (surface.texels(), surface.wrap())) {
+            if maps.is_some() {
+                queue.clear();
+            }
+            commands.entity(entity).insert(CpuMaps::new(surface));
+        }
     }
 }
 

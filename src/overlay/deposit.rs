@@ -75,7 +75,8 @@ pub(super) fn measure_texels(
     >,
 ) {
     for (entity, surface, collider, transform) in &changed {
-        let areas = TexelAreas::new(collider.0.triangles(), &transform.affine(), surface.texels());
+        let areas =
+            TexelAreas::new(collider.0.triangles(), &transform.affine(), surface.texels(), surface.wrap());
         commands.entity(entity).insert(areas);
     }
 }

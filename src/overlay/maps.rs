@@ -4,6 +4,7 @@ use bevy::math::Affine3A;
 use bevy::prelude::*;
 use bytemuck::{Pod, Zeroable};
 
+use super::Wrap;
 use crate::collision::MeshTriangles;
 
 /// State of one texel. A row of the GPU's state buffer.
@@ -38,34 +39,36 @@ pub struct TexelAreas {
 }
 
 impl TexelAreas {
-    /// Rasterizes the triangles over their uvs; a texel belongs to the triangles that its middle lies in, and takes
-    /// the density of each. Tiled uvs wrap. Triangles smaller than a texel that cover no middle give their area
-    /// to the texel they lie in, so that `total_mm2` is the area of the mesh up to overlaps at edges.
-    pub fn new(triangles: &MeshTriangles, world_from_mesh: &Affine3A, size: u32) -> Self {
-        let mut mm2 = vec![0.0f32; (size * size) as usize];
+    /// Rasterizes the triangles over their uvs; a texel belongs to the triangle that its middle lies in, once per
+    /// tile of tiled uvs, and takes its density. Uvs outside the map go where [`Wrap`] says. A triangle that covers no
+    /// middle gives its area to the texel it lies in; one that reaches over a whole map, to all texels alike. So
+    /// `total_mm2` is the area of the mesh, but for overlaps along the edges of islands.
+    pub fn new(triangles: &MeshTriangles, world_from_mesh: &Affine3A, size: u32, wrap: [Wrap; 2]) -> Self {
         let side = size as i32;
+        let mut mm2 = vec![0.0f32; (size * size) as usize];
         let mut put = |x: i32, y: i32, area: f32| {
-            mm2[(y.rem_euclid(side) * side + x.rem_euclid(side)) as usize] += area;
+            let inside = |texel: i32, wrap| match wrap {
+                Wrap::Repeat => texel.rem_euclid(side),
+                Wrap::Clamp => texel.clamp(0, side - 1),
+            };
+            mm2[(inside(y, wrap[1]) * side + inside(x, wrap[0])) as usize] += area;
         };
+        let mut everywhere = 0.0;
         for (corners, uvs) in triangles.positions.iter().zip(&triangles.uvs) {
             let [a, b, c] = corners.map(|corner| world_from_mesh.transform_point3(corner));
             let area_mm2 = (b - a).cross(c - a).length() * 0.5e6;
-            let [p, q, r] = uvs.map(|uv| uv * size as f32);
-            let twice_texels = (q - p).perp_dot(r - p);
-            let low = p.min(q).min(r);
-            let high = p.max(q).max(r);
-            // A triangle over a whole map or more (or with no area in uv) says nothing about single texels.
-            let (width, height) = (high - low).into();
+            let texels = Footprint::new(uvs.map(|uv| uv * size as f32));
+            let (low, high) = texels.bounds();
+            if (high - low).max_element() > size as f32 + 1.0 {
+                everywhere += f64::from(area_mm2);
+                continue;
+            }
+            let per_texel = area_mm2 / texels.area();
             let mut covered = 0u32;
-            if twice_texels != 0.0 && width <= size as f32 + 1.0 && height <= size as f32 + 1.0 {
-                let per_texel = area_mm2 / (twice_texels.abs() * 0.5);
+            if per_texel.is_finite() {
                 for y in low.y.floor() as i32..=high.y.floor() as i32 {
                     for x in low.x.floor() as i32..=high.x.floor() as i32 {
-                        let middle = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-                        let side_of = |from: Vec2, to: Vec2| {
-                            (to - from).perp_dot(middle - from) * twice_texels.signum()
-                        };
-                        if side_of(p, q) >= 0.0 && side_of(q, r) >= 0.0 && side_of(r, p) >= 0.0 {
+                        if texels.covers(Vec2::new(x as f32 + 0.5, y as f32 + 0.5)) {
                             put(x, y, per_texel);
                             covered += 1;
                         }
@@ -73,9 +76,13 @@ impl TexelAreas {
                 }
             }
             if covered == 0 {
-                let middle = (p + q + r) / 3.0;
+                let middle = (low + high) / 2.0;
                 put(middle.x.floor() as i32, middle.y.floor() as i32, area_mm2);
             }
+        }
+        if everywhere > 0.0 {
+            let share = (everywhere / f64::from(size * size)) as f32;
+            mm2.iter_mut().for_each(|texel| *texel += share);
         }
         let total_mm2 = mm2.iter().copied().map(f64::from).sum();
         let used = mm2.iter().filter(|&&area| area > 0.0).count().max(1);
@@ -96,6 +103,35 @@ impl TexelAreas {
     }
 }
 
+/// A triangle in the plane of the map, in texels, counter-clockwise.
+struct Footprint([Vec2; 3]);
+
+impl Footprint {
+    fn new([a, b, c]: [Vec2; 3]) -> Self {
+        Self(if (b - a).perp_dot(c - a) < 0.0 { [a, c, b] } else { [a, b, c] })
+    }
+
+    fn bounds(&self) -> (Vec2, Vec2) {
+        let [a, b, c] = self.0;
+        (a.min(b).min(c), a.max(b).max(c))
+    }
+
+    fn area(&self) -> f32 {
+        let [a, b, c] = self.0;
+        (b - a).perp_dot(c - a) * 0.5
+    }
+
+    /// Whether a point lies inside; one on an edge lies in one of the two triangles that share it.
+    fn covers(&self, point: Vec2) -> bool {
+        let [a, b, c] = self.0;
+        [(a, b), (b, c), (c, a)].into_iter().all(|(from, to)| {
+            let edge = to - from;
+            let side = edge.perp_dot(point - from);
+            side > 0.0 || (side == 0.0 && (edge.y > 0.0 || (edge.y == 0.0 && edge.x < 0.0)))
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -111,21 +147,45 @@ mod tests {
         }
     }
 
+    const REPEAT: [Wrap; 2] = [Wrap::Repeat; 2];
+
     #[test]
     fn a_square_is_shared_evenly_by_its_texels() {
-        let areas = TexelAreas::new(&quad(1.0), &Affine3A::IDENTITY, 32);
-        // 4 m² over 1024 texels; the diagonal belongs to both triangles.
+        let areas = TexelAreas::new(&quad(1.0), &Affine3A::IDENTITY, 32, REPEAT);
+        // 4 m² over 1024 texels, those on the diagonal in one of the triangles.
         let expected = 4.0e6 / 1024.0;
-        let once = areas.mm2.iter().filter(|&&area| (area - expected).abs() < 1.0).count();
-        assert!(once >= 1024 - 32, "{once}");
-        assert!((areas.total_mm2 - 4.0e6).abs() < 4.0e6 * 0.04, "{}", areas.total_mm2);
+        assert!(areas.mm2.iter().all(|&area| (area - expected).abs() < 1.0), "{:?}", areas.mm2);
+        assert!((areas.total_mm2 - 4.0e6).abs() < 1.0, "{}", areas.total_mm2);
+    }
+
+    #[test]
+    fn texels_of_tiled_uvs_stand_for_all_their_tiles() {
+        for tiles in [2.0, 10.0, 10.3] {
+            let areas = TexelAreas::new(&quad(tiles), &Affine3A::IDENTITY, 32, REPEAT);
+            assert!((areas.total_mm2 - 4.0e6).abs() < 10.0, "{tiles}: {}", areas.total_mm2);
+            let mean = f64::from(areas.mean_mm2);
+            assert!((mean - 4.0e6 / 1024.0).abs() < 1.0, "{tiles}: {mean}");
+            assert!(areas.mm2.iter().all(|&area| area > 0.0));
+        }
+    }
+
+    #[test]
+    fn uvs_outside_a_clamped_map_belong_to_its_edge() {
+        let mut shifted = quad(0.5);
+        shifted.uvs.iter_mut().flatten().for_each(|uv| uv.x += 0.75);
+        let clamped = TexelAreas::new(&shifted, &Affine3A::IDENTITY, 32, [Wrap::Clamp; 2]);
+        let column = |x: usize| (0..32).map(|y| f64::from(clamped.mm2[y * 32 + x])).sum::<f64>();
+        assert_eq!(column(0), 0.0);
+        assert!((clamped.total_mm2 - 4.0e6).abs() < 1.0);
+        // Half of the square lies beyond the edge.
+        assert!(column(31) > 2.0e6 && column(30) < 0.3e6, "{} {}", column(31), column(30));
     }
 
     #[test]
     fn scale_counts() {
         let doubled = Affine3A::from_scale(Vec3::new(3.0, 1.0, 2.0));
-        let plain = TexelAreas::new(&quad(0.5), &Affine3A::IDENTITY, 64);
-        let scaled = TexelAreas::new(&quad(0.5), &doubled, 64);
+        let plain = TexelAreas::new(&quad(0.5), &Affine3A::IDENTITY, 64, REPEAT);
+        let scaled = TexelAreas::new(&quad(0.5), &doubled, 64, REPEAT);
         assert!((scaled.total_mm2 / plain.total_mm2 - 6.0).abs() < 1e-3);
     }
 

@@ -4,8 +4,8 @@
 //! flies in the [exposure](crate::effect::ParticleLook::exposure) of its effect. Enough for tens of thousands; the CPU
 //! writes 4 vertices each.
 
-use bevy::asset::RenderAssetUsages;
-use bevy::camera::visibility::NoFrustumCulling;
+use bevy::asset::{AssetEventSystems, RenderAssetUsages};
+use bevy::camera::visibility::{NoFrustumCulling, VisibilitySystems};
 use bevy::light::{NotShadowCaster, NotShadowReceiver};
 use bevy::mesh::{Indices, PrimitiveTopology};
 use bevy::prelude::*;
@@ -24,7 +24,14 @@ pub struct ParticleDrawPlugin;
 impl Plugin for ParticleDrawPlugin {
     fn build(&self, app: &mut App) {
         if app.get_sub_app(RenderApp).is_some() {
-            app.add_systems(Startup, spawn_particle_mesh).add_systems(PostUpdate, draw_particles);
+            app.add_systems(Startup, spawn_particle_mesh).add_systems(
+                PostUpdate,
+                draw_particles
+                    // Streaks face the cameras where they are in this frame, and are drawn in it.
+                    .after(TransformSystems::Propagate)
+                    .before(VisibilitySystems::VisibilityPropagate)
+                    .before(AssetEventSystems),
+            );
         }
     }
 }

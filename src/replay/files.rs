@@ -7,6 +7,7 @@ use std::path::Path;
 use tempfile::NamedTempFile;
 
 use super::ReplayError;
+use super::maps::MAP_NAMES;
 
 /// Writes under a temporary name beside `path` and renames; makes missing folders. On an error nothing is left.
 ///
@@ -31,6 +32,30 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), ReplayError> {
 pub(super) fn require_writable(folder: &Path) -> Result<(), ReplayError> {
     let writable = fs::create_dir_all(folder).and_then(|()| temporary_beside(&folder.join("report.json")));
     writable.map(drop).map_err(|source| ReplayError::Write { path: folder.into(), source })
+}
+
+/// Removes what an earlier run left in the folder, so that nothing of it stands beside this one's files.
+///
+/// # Errors
+/// [`ReplayError::Write`] with the file.
+pub(super) fn remove_earlier_run(folder: &Path) -> Result<(), ReplayError> {
+    let is_frame = |name: &str| {
+        let number = name.strip_prefix("frame_").and_then(|name| name.strip_suffix(".png"));
+        number.is_some_and(|number| number.len() >= 5 && number.bytes().all(|byte| byte.is_ascii_digit()))
+    };
+    let is_map = |name: &str| MAP_NAMES.iter().any(|map| name.ends_with(&format!("_{map}.png")));
+    let ours: [(&Path, &dyn Fn(&str) -> bool); 2] =
+        [(folder, &|name| name == "report.json" || is_frame(name)), (&folder.join("maps"), &is_map)];
+    for (folder, is_ours) in ours {
+        let Ok(entries) = fs::read_dir(folder) else { continue };
+        for entry in entries.filter_map(Result::ok) {
+            if entry.file_name().to_str().is_some_and(is_ours) {
+                let path = entry.path();
+                fs::remove_file(&path).map_err(|source| ReplayError::Write { path, source })?;
+            }
+        }
+    }
+    Ok(())
 }
 
 fn temporary_beside(path: &Path) -> std::io::Result<NamedTempFile> {
@@ -58,6 +83,26 @@ mod tests {
         write_atomic(&path, b"two").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"two");
         assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn an_earlier_run_is_removed_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let ours = [
+            "report.json",
+            "frame_00000.png",
+            "frame_123456.png",
+            "maps/a_b_water.png",
+            "maps/a_wet_since.png",
+        ];
+        let others = ["frame_1.png", "frame_abcde.png", "notes.txt", "maps/mine.png"];
+        for name in ours.iter().chain(&others) {
+            write_atomic(&folder.path().join(name), b"x").unwrap();
+        }
+        remove_earlier_run(folder.path()).unwrap();
+        assert!(ours.iter().all(|name| !folder.path().join(name).exists()));
+        assert!(others.iter().all(|name| folder.path().join(name).exists()));
+        remove_earlier_run(&folder.path().join("nowhere")).unwrap();
     }
 
     #[test]

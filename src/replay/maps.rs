@@ -144,21 +144,25 @@ fn without_padding(bytes: &[u8], size: u32) -> Vec<u8> {
     bytes.chunks(padded.max(row)).flat_map(|padded| &padded[..row]).copied().collect()
 }
 
+/// What is written of each surface.
+pub(super) const MAP_NAMES: [&str; 5] = ["diffuse", "specular", "normal", "water", "wet_since"];
+
 /// Writes `<surface>_<map>.png` for each map: `diffuse`, `specular`, `normal` as they are, `water` as 16-bit
 /// micrometres of film, `wet_since` as 16-bit hundredths of a second (0 is dry). Values too large stop at 65,535.
 pub(super) fn write_maps(folder: &Path, surfaces: &[SurfaceMaps]) -> Result<(), ReplayError> {
     for surface in surfaces {
-        let path = |map: &str| folder.join(format!("{}_{map}.png", surface.name));
-        for (map, texels) in
-            [("diffuse", &surface.diffuse), ("specular", &surface.specular), ("normal", &surface.normal)]
+        let path = |map| folder.join(format!("{}_{map}.png", surface.name));
+        let [diffuse, specular, normal, water, wet_since] = MAP_NAMES.map(path);
+        for (path, texels) in
+            [(diffuse, &surface.diffuse), (specular, &surface.specular), (normal, &surface.normal)]
         {
-            write_png(&path(map), texels, surface.size, ExtendedColorType::Rgba8)?;
+            write_map(&path, texels, surface.size, ExtendedColorType::Rgba8)?;
         }
         // 1 nl on 1 mm² is 1 µm.
         let film = |texel: &TexelState| texel.water_nl as f32 / surface.texel_mm2;
-        write_grey(&path("water"), surface, film)?;
+        write_grey(&water, surface, film)?;
         let since = |texel: &TexelState| texel.wet_since as f32 * 100.0 / surface.hz as f32;
-        write_grey(&path("wet_since"), surface, since)?;
+        write_grey(&wet_since, surface, since)?;
     }
     Ok(())
 }
@@ -170,10 +174,10 @@ fn write_grey(
 ) -> Result<(), ReplayError> {
     let texels: Vec<u16> =
         surface.state.iter().map(|texel| value(texel).round().clamp(0.0, 65_535.0) as u16).collect();
-    write_png(path, bytemuck::cast_slice(&texels), surface.size, ExtendedColorType::L16)
+    write_map(path, bytemuck::cast_slice(&texels), surface.size, ExtendedColorType::L16)
 }
 
-fn write_png(path: &Path, bytes: &[u8], size: u32, color: ExtendedColorType) -> Result<(), ReplayError> {
+fn write_map(path: &Path, bytes: &[u8], size: u32, color: ExtendedColorType) -> Result<(), ReplayError> {
     let mut file = Cursor::new(Vec::new());
     PngEncoder::new(&mut file)
         .write_image(bytes, size, size, color)

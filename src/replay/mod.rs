@@ -141,6 +141,7 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
     let mut run = Run::load(options)?;
     if let Some(out) = &options.out {
         files::require_writable(out)?;
+        files::remove_earlier_run(out)?;
     }
     let loaded = begun.elapsed();
 

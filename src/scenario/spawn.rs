@@ -10,8 +10,8 @@ use bevy::render::RenderApp;
 use super::content::Content;
 use super::motion::{EmitterMotion, ScenarioCamera, move_camera, move_emitters};
 use super::{Digest, LoadedScenario, MeshSpec, ScenarioError, digest};
-use crate::clock::{ClockPlugin, WeatheringClock};
-use crate::collision::{MeshColliders, NotWeatherable, SurfaceCollider};
+use crate::clock::ClockPlugin;
+use crate::collision::{BuildColliders, MeshColliders, NotWeatherable, SurfaceCollider};
 use crate::effect::{EffectTable, WeatherEffect};
 use crate::emitter::{EmissionSeed, Emitter};
 use crate::overlay::TexelAreas;
@@ -74,7 +74,7 @@ impl Plugin for ScenarioPlugin {
             .insert_resource(CurrentScenario(self.scenario.clone()))
             .init_resource::<ScenarioStatus>()
             .init_resource::<Digest>()
-            .add_systems(PreUpdate, watch_loading.run_if(is_loading))
+            .add_systems(PreUpdate, watch_loading.run_if(is_loading).after(BuildColliders))
             .add_systems(
                 WeatheringTick,
                 (
@@ -239,13 +239,5 @@ fn watch_loading(
     if unfinished.is_empty() && colliders.building() == 0 {
         *status = ScenarioStatus::Ready;
         time.unpause();
-    }
-}
-
-impl ClockPlugin {
-    /// Sets the clock of an app that has the plugin already.
-    fn insert_clock(&self, app: &mut App) {
-        let clock = WeatheringClock::new(self.hz);
-        app.insert_resource(Time::<Fixed>::from_hz(f64::from(clock.hz()))).insert_resource(clock);
     }
 }

@@ -11,6 +11,7 @@ use super::{
 use crate::clock::WeatheringClock;
 use crate::emitter::EmitterShape;
 use crate::overlay::{TILE_SIZE, Weatherable};
+use crate::particle::Lifespan;
 
 /// The farthest coordinate: beyond it an f32 is coarser than a drop.
 const FAR: f32 = 1.0e5;
@@ -154,7 +155,8 @@ impl LoadedScenario {
         self.not_negative(&format!("{field}.rate"), emitter.rate, Scenario::MAX_RATE)?;
         self.not_negative(&format!("{field}.speed"), emitter.speed, 1000.0)?;
         self.not_negative(&format!("{field}.spread_deg"), emitter.spread_deg, 180.0)?;
-        self.positive(&format!("{field}.lifetime"), emitter.lifetime, 3600.0)?;
+        let longest = f32::from(Lifespan::MAX_TICKS) / self.scenario.tick_hz as f32;
+        self.positive(&format!("{field}.lifetime"), emitter.lifetime, longest.min(3600.0))?;
         self.not_negative(&format!("{field}.start"), emitter.start, Scenario::MAX_SECONDS)?;
         if let Some(stop) = emitter.stop {
             self.not_negative(&format!("{field}.stop"), stop, Scenario::MAX_SECONDS)?;

@@ -22,6 +22,21 @@ use super::harness;
 
 /// An app with everything, driven by hand; `None` where the GPU is skipped.
 pub fn app() -> Option<App> {
+    let mut app = unfinished_app()?;
+    app.finish();
+    app.cleanup();
+    Some(app)
+}
+
+/// The same while plugins can still be added.
+pub fn unfinished_app() -> Option<App> {
+    let mut app = bare_app()?;
+    app.add_plugins(WeatheringPlugins).insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
+    Some(app)
+}
+
+/// Bevy alone.
+pub fn bare_app() -> Option<App> {
     harness::gpu()?;
     let mut app = App::new();
     let no_window =
@@ -34,11 +49,7 @@ pub fn app() -> Option<App> {
             .disable::<PipelinedRenderingPlugin>()
             .disable::<LogPlugin>()
             .disable::<PanicHandlerPlugin>(),
-    )
-    .add_plugins(WeatheringPlugins)
-    .insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
-    app.finish();
-    app.cleanup();
+    );
     Some(app)
 }
 

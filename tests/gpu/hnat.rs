@@ -2,7 +2,7 @@
 
 use std::f32::consts::FRAC_PI_2;
 
-use bevy_weathering::material::hnat::{PorousParams, hnat_terms, wet_tau};
+use bevy_weathering::material::models::hnat::{PorousParams, hnat_terms, wet_tau};
 
 use super::harness;
 

@@ -12,6 +12,10 @@ use crate::overlay::{TexelState, Weatherable, Wrap};
 #[derive(Component, Reflect, Debug, Clone)]
 #[reflect(Component)]
 pub struct Overlays {
+    /// Texels along each side.
+    pub size: u32,
+    /// Edge behaviour along u and v.
+    pub wrap: [Wrap; 2],
     /// Colour over the surface's; linear `rgba8unorm`, premultiplied.
     pub diffuse: Handle<Image>,
     /// Reflectance, smoothness, unused, coverage; `rgba8unorm`, premultiplied.
@@ -31,7 +35,7 @@ impl Overlays {
         let bytes = (size * size) as usize * size_of::<TexelState>();
         // wgpu zeroes what is created without data.
         let state = buffers.add(ShaderBuffer::with_size(bytes, RenderAssetUsages::RENDER_WORLD));
-        Self { diffuse, specular, normal, state }
+        Self { size, wrap: surface.wrap(), diffuse, specular, normal, state }
     }
 }
 

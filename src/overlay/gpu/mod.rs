@@ -16,16 +16,19 @@ use bevy::render::renderer::RenderGraph;
 use bevy::render::{ExtractSchedule, Render, RenderApp, RenderStartup, RenderSystems};
 use bevy::shader::load_shader_library;
 
+use super::SplatQueue;
+
 pub use maps::Overlays;
 pub use prepare::{SplatStats, SurfaceBatch};
 
-/// Paints splats with a compute pass. Needs a render app; without one it does nothing and splats pile up, so leave
-/// it out there and add [`CpuOverlayPlugin`](super::CpuOverlayPlugin).
+/// Paints splats with a compute pass. Needs a render app; without one it throws splats away. To keep what falls there,
+/// put [`CpuOverlayPlugin`](super::CpuOverlayPlugin) in its place.
 pub struct GpuOverlayPlugin;
 
 impl Plugin for GpuOverlayPlugin {
     fn build(&self, app: &mut App) {
         if app.get_sub_app(RenderApp).is_none() {
+            app.add_systems(PostUpdate, discard_splats);
             return;
         }
         load_shader_library!(app, "../../../shaders/common/kernel.wgsl");
@@ -44,5 +47,14 @@ impl Plugin for GpuOverlayPlugin {
             .add_systems(Render, prepare::prepare_splats.in_set(RenderSystems::PrepareBindGroups))
             // Materials sample the maps that this pass writes.
             .add_systems(RenderGraph, pass::paint_splats.before(camera_driver));
+    }
+}
+
+/// So that queues do not grow without end where nobody paints.
+fn discard_splats(mut queues: Query<&mut SplatQueue>) {
+    for mut queue in &mut queues {
+        if !queue.is_empty() {
+            queue.clear();
+        }
     }
 }

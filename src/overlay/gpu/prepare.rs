@@ -11,12 +11,12 @@ use bevy::render::render_resource::{
     BindGroup, BindGroupEntries, BufferUsages, DynamicUniformBuffer, PipelineCache, RawBufferVec, ShaderType,
 };
 use bevy::render::renderer::{RenderDevice, RenderQueue};
-use bevy::render::storage::GpuShaderBuffer;
+use bevy::render::storage::{GpuShaderBuffer, ShaderBuffer};
 use bevy::render::texture::GpuImage;
 
 use super::maps::Overlays;
 use super::pass::SplatPipeline;
-use crate::overlay::{Splat, SplatQueue, TileBins, TileHeader, Weatherable, Wrap};
+use crate::overlay::{Splat, SplatQueue, TileBins, TileHeader, Wrap};
 
 /// What the pass needs to know about one surface. `SurfaceBatch` in `shaders/splat.wgsl` has the same fields.
 #[derive(ShaderType, Debug, Clone, Copy)]
@@ -72,43 +72,54 @@ pub(super) struct PendingSplats {
 
 struct PendingSurface {
     entity: Entity,
-    surface: Weatherable,
-    overlays: Overlays,
+    maps: Maps,
     splats: Vec<Splat>,
+}
+
+/// [`Overlays`] by name, so that nothing here keeps the maps of a surface that has gone or got others.
+#[derive(Clone, Copy)]
+struct Maps {
+    size: u32,
+    wrap: [Wrap; 2],
+    images: [AssetId<Image>; 3],
+    state: AssetId<ShaderBuffer>,
+}
+
+impl From<&Overlays> for Maps {
+    fn from(overlays: &Overlays) -> Self {
+        Self {
+            size: overlays.size,
+            wrap: overlays.wrap,
+            images: [overlays.diffuse.id(), overlays.specular.id(), overlays.normal.id()],
+            state: overlays.state.id(),
+        }
+    }
 }
 
 /// Moves the waiting splats into the render world.
 pub(super) fn extract_splats(
     mut main_world: ResMut<MainWorld>,
     mut pending: ResMut<PendingSplats>,
-    mut query: Local<
-        Option<QueryState<(Entity, &'static Weatherable, &'static Overlays, &'static mut SplatQueue)>>,
-    >,
+    mut query: Local<Option<QueryState<(Entity, &'static Overlays, &'static mut SplatQueue)>>>,
 ) {
     let query = query.get_or_insert_with(|| main_world.query());
     let PendingSplats { surfaces, by_entity } = &mut *pending;
-    for (entity, surface, overlays, mut queue) in query.iter_mut(&mut main_world) {
+    for (entity, overlays, mut queue) in query.iter_mut(&mut main_world) {
         if queue.is_empty() {
             continue;
         }
         let index = *by_entity.entry(entity).or_insert_with(|| {
-            surfaces.push(PendingSurface {
-                entity,
-                surface: *surface,
-                overlays: overlays.clone(),
-                splats: Vec::new(),
-            });
+            surfaces.push(PendingSurface { entity, maps: overlays.into(), splats: Vec::new() });
             surfaces.len() - 1
         });
         let waiting = &mut surfaces[index];
-        if waiting.overlays.state != overlays.state {
+        if waiting.maps.state != overlays.state.id() {
             // New maps: what was meant for the old ones is gone with them.
             waiting.splats.clear();
         }
-        (waiting.surface, waiting.overlays) = (*surface, overlays.clone());
+        waiting.maps = overlays.into();
         queue.drain_into(&mut waiting.splats);
     }
-    // The handles here keep the maps of surfaces that are gone alive; let go of them.
     let gone = |waiting: &PendingSurface| main_world.get_entity(waiting.entity).is_err();
     if surfaces.iter().any(gone) {
         surfaces.retain(|waiting| !gone(waiting));
@@ -175,16 +186,12 @@ pub(super) fn prepare_splats(
     tiles.clear();
     list.clear();
     for waiting in pending.surfaces.iter_mut().filter(|surface| !surface.splats.is_empty()) {
-        let maps = &waiting.overlays;
-        let (Some(diffuse), Some(specular), Some(normal), Some(state)) = (
-            images.get(&maps.diffuse),
-            images.get(&maps.specular),
-            images.get(&maps.normal),
-            buffers.get(&maps.state),
-        ) else {
+        let Maps { size, wrap, images: [diffuse, specular, normal], state } = waiting.maps;
+        let (Some(diffuse), Some(specular), Some(normal), Some(state)) =
+            (images.get(diffuse), images.get(specular), images.get(normal), buffers.get(state))
+        else {
             continue;
         };
-        let (size, wrap) = (waiting.surface.texels(), waiting.surface.wrap());
         let first_tile = tiles.len() as u32;
         let first_splat = splats.len() as u32;
         bins.bin(&waiting.splats, size, wrap, first_splat, tiles.values_mut(), list.values_mut());
@@ -233,9 +240,15 @@ mod tests {
     /// A main world with one surface, inside a render world, as `ExtractSchedule` sees them.
     fn worlds() -> (World, Entity) {
         let mut main = MainWorld::default();
-        let overlays =
-            Overlays { diffuse: default(), specular: default(), normal: default(), state: default() };
-        let surface = main.spawn((Weatherable::default(), overlays, SplatQueue::default())).id();
+        let overlays = Overlays {
+            size: 512,
+            wrap: [Wrap::Repeat; 2],
+            diffuse: default(),
+            specular: default(),
+            normal: default(),
+            state: default(),
+        };
+        let surface = main.spawn((overlays, SplatQueue::default())).id();
         let mut render = World::new();
         render.insert_resource(main);
         render.init_resource::<PendingSplats>();

@@ -24,10 +24,7 @@ struct ScreenshotFolder(PathBuf);
 pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
     let loaded = Scenario::load(&arguments.file)?;
     require_adapter()?;
-    if cfg!(target_os = "linux")
-        && std::env::var_os("DISPLAY").is_none()
-        && std::env::var_os("WAYLAND_DISPLAY").is_none()
-    {
+    if cfg!(target_os = "linux") && std::env::var_os("DISPLAY").is_none() {
         return Err("no display: DISPLAY is not set; use `weathering replay`, or start one (Xvfb)".into());
     }
     let scenario = ScenarioPlugin::new(loaded.clone(), true)?;

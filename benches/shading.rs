@@ -1,0 +1,209 @@
+//! What a pixel of a weathered surface costs, against the same pixel of a `StandardMaterial`.
+//!
+//! A wall fills a picture of 1280 by 1024, lit by one sun without shadows and an environment map, with colour, normal
+//! and roughness textures. One app holds a wall of each kind; every round shows each of them for some frames. A frame is
+//! timed until the GPU is done with it; a frame that shows nothing tells what is not shading.
+
+use std::time::Instant;
+
+use bevy::app::PanicHandlerPlugin;
+use bevy::asset::RenderAssetUsages;
+use bevy::camera::RenderTarget;
+use bevy::camera::visibility::RenderLayers;
+use bevy::light::EnvironmentMapLight;
+use bevy::log::LogPlugin;
+use bevy::prelude::*;
+use bevy::render::RenderPlugin;
+use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
+use bevy::render::render_resource::{Extent3d, PollType, TextureDimension, TextureFormat, TextureUsages};
+use bevy::render::renderer::RenderDevice;
+use bevy::time::TimeUpdateStrategy;
+use bevy::window::ExitCondition;
+use bevy::winit::WinitPlugin;
+use bevy_weathering::WeatheringPlugins;
+use bevy_weathering::material::{DryMaterial, PorousMaterial};
+use bevy_weathering::overlay::{Splat, SplatQueue, SplatStats, Weatherable};
+use bevy_weathering::scenes::stone::{Stone, stone_maps};
+use criterion::Criterion;
+
+use crate::measure;
+
+const SIZE: UVec2 = UVec2::new(1280, 1024);
+const MAP_SIZE: u32 = 256;
+const ROUNDS: u32 = 6;
+const FRAMES: u32 = 2;
+
+/// One wall.
+struct Wall {
+    name: &'static str,
+    /// `None` is a `StandardMaterial`.
+    porous: Option<PorousMaterial>,
+    /// Water on all of it, mm.
+    water_mm: f32,
+}
+
+fn walls() -> Vec<Wall> {
+    let porous = Some(PorousMaterial { t_fill: 0.0, ..default() });
+    vec![
+        Wall { name: "standard", porous: None, water_mm: 0.0 },
+        Wall { name: "dry", porous, water_mm: 0.0 },
+        Wall { name: "wet", porous, water_mm: 0.05 },
+    ]
+}
+
+fn headless() -> App {
+    let mut app = App::new();
+    let no_window =
+        WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
+    app.add_plugins(
+        DefaultPlugins
+            .set(no_window)
+            .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
+            .disable::<WinitPlugin>()
+            .disable::<PipelinedRenderingPlugin>()
+            .disable::<LogPlugin>()
+            .disable::<PanicHandlerPlugin>(),
+    )
+    .add_plugins(WeatheringPlugins)
+    .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+    app.finish();
+    app.cleanup();
+    app
+}
+
+/// One frame, until the GPU is done with it.
+fn frame(app: &mut App) {
+    app.update();
+    let device = app.world().resource::<RenderDevice>().wgpu_device();
+    device.poll(PollType::Wait { submission_index: None, timeout: None }).unwrap();
+}
+
+/// Spawns a wall on a layer of its own.
+fn spawn_wall(
+    app: &mut App,
+    wall: &Wall,
+    layer: usize,
+    mesh: &Handle<Mesh>,
+    dry: &StandardMaterial,
+) -> Entity {
+    let material = app.world_mut().resource_mut::<Assets<StandardMaterial>>().add(dry.clone());
+    let looks = (Mesh3d(mesh.clone()), MeshMaterial3d(material), RenderLayers::layer(layer));
+    let mut entity = app.world_mut().spawn(looks);
+    if let Some(porous) = wall.porous {
+        entity.insert((porous, Weatherable { map_size: MAP_SIZE, ..default() }));
+    }
+    entity.id()
+}
+
+/// Lays water on all of a wall: stamps as large as the map, two by two, spread nearly evenly.
+fn wet(app: &mut App, entity: Entity, water_mm: f32, area_m2: f32) {
+    let quarter = (MAP_SIZE * 256 / 2) as i32;
+    let mut queue = app.world_mut().get_mut::<SplatQueue>(entity).unwrap();
+    for center in [[0, 0], [quarter, 0], [0, quarter], [quarter, quarter]] {
+        let water_nl = (water_mm * area_m2 * 1e9 / 4.0) as u32;
+        let radius = [(MAP_SIZE as i32 - 1) * 128; 2];
+        queue.push(Splat { center, radius, water_nl, tick: 1, ..bytemuck::Zeroable::zeroed() });
+    }
+}
+
+/// Runs the group.
+pub fn bench(_: &mut Criterion) {
+    if !measure::wanted("shading") || !measure::measuring() {
+        return;
+    }
+    let walls = walls();
+    let mut app = headless();
+    let world = app.world_mut();
+    let mut target = Image::new_uninit(
+        Extent3d { width: SIZE.x, height: SIZE.y, depth_or_array_layers: 1 },
+        TextureDimension::D2,
+        TextureFormat::Rgba8UnormSrgb,
+        RenderAssetUsages::RENDER_WORLD,
+    );
+    target.texture_descriptor.usage |= TextureUsages::RENDER_ATTACHMENT;
+    let mut images = world.resource_mut::<Assets<Image>>();
+    let target = images.add(target);
+    let environment = EnvironmentMapLight {
+        intensity: 400.0,
+        ..EnvironmentMapLight::hemispherical_gradient(
+            &mut images,
+            Color::linear_rgb(0.5, 0.7, 1.0),
+            Color::linear_rgb(0.8, 0.8, 0.8),
+            Color::linear_rgb(0.25, 0.2, 0.15),
+        )
+    };
+    let stone = stone_maps(Stone::Brick, 512, 1);
+    let roughness = images.add(stone.roughness);
+    let dry = StandardMaterial {
+        base_color_texture: Some(images.add(stone.albedo)),
+        normal_map_texture: Some(images.add(stone.normal)),
+        metallic_roughness_texture: Some(roughness),
+        perceptual_roughness: 1.0,
+        ..default()
+    };
+    let size = Vec2::new(5.0, 4.0);
+    let wall_mesh = Mesh::from(Rectangle::from_size(size)).with_generated_tangents().unwrap();
+    let mesh = world.resource_mut::<Assets<Mesh>>().add(wall_mesh);
+    let all = RenderLayers::from_layers(&(0..walls.len() + 1).collect::<Vec<_>>());
+    world.spawn((
+        DirectionalLight { illuminance: 5000.0, ..default() },
+        Transform::default().looking_to(Vec3::new(-1.0, -1.0, -1.0), Vec3::Y),
+        all,
+    ));
+    let camera = world
+        .spawn((
+            Camera3d::default(),
+            Msaa::Off,
+            RenderTarget::from(target),
+            environment,
+            Transform::from_xyz(0.6, 0.3, 2.0).looking_at(Vec3::new(0.2, 0.0, 0.0), Vec3::Y),
+        ))
+        .id();
+    let mut entities = Vec::new();
+    for (layer, wall) in walls.iter().enumerate() {
+        entities.push(spawn_wall(&mut app, wall, layer, &mesh, &dry));
+    }
+    let weathered: Vec<_> = (0..walls.len()).filter(|&i| walls[i].porous.is_some()).collect();
+    while !weathered.iter().all(|&i| app.world().get::<DryMaterial>(entities[i]).is_some()) {
+        frame(&mut app);
+    }
+    for (wall, &entity) in walls.iter().zip(&entities) {
+        if wall.water_mm > 0.0 {
+            wet(&mut app, entity, wall.water_mm, size.x * size.y);
+        }
+    }
+    let wetted = 4 * walls.iter().filter(|wall| wall.water_mm > 0.0).count() as u64;
+    while app.world().resource::<SplatStats>().splats() < wetted {
+        frame(&mut app);
+    }
+    // The last layer is empty.
+    let mut seconds = vec![Vec::new(); walls.len() + 1];
+    for round in 0..=ROUNDS {
+        for (layer, seconds) in seconds.iter_mut().enumerate() {
+            app.world_mut().entity_mut(camera).insert(RenderLayers::layer(layer));
+            frame(&mut app);
+            let begun = Instant::now();
+            for _ in 0..FRAMES {
+                frame(&mut app);
+            }
+            // The first round makes pipelines.
+            if round > 0 {
+                seconds.push(begun.elapsed().as_secs_f64() / f64::from(FRAMES));
+            }
+        }
+    }
+    let medians: Vec<_> = seconds
+        .iter_mut()
+        .map(|seconds| {
+            seconds.sort_by(f64::total_cmp);
+            seconds[seconds.len() / 2]
+        })
+        .collect();
+    let (standard, empty) = (medians[0], medians[walls.len()]);
+    println!("shading: empty frame {:.1} ms; median of {ROUNDS} rounds of {FRAMES} frames", empty * 1e3);
+    println!("| | ms a frame | of the standard frame | without the empty frame |\n|---|---|---|---|");
+    for (wall, &median) in walls.iter().zip(&medians) {
+        let (whole, bare) = (median / standard, (median - empty) / (standard - empty));
+        println!("| `{}` | {:.1} | {whole:.3} | {bare:.3} |", wall.name, median * 1e3);
+    }
+}
