@@ -21,7 +21,7 @@ use bevy::time::TimeUpdateStrategy;
 use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
 use bevy_weathering::WeatheringPlugins;
-use bevy_weathering::material::{DryMaterial, PorousMaterial};
+use bevy_weathering::material::{DryMaterial, PorousMaterial, WettingModel};
 use bevy_weathering::overlay::{Splat, SplatQueue, SplatStats, Weatherable};
 use bevy_weathering::scenes::stone::{Stone, stone_maps};
 use criterion::Criterion;
@@ -43,11 +43,25 @@ struct Wall {
 }
 
 fn walls() -> Vec<Wall> {
-    let porous = Some(PorousMaterial { t_fill: 0.0, ..default() });
+    let with = |model| Some(PorousMaterial { model, t_fill: 0.0, ..default() });
+    let hnat = with(WettingModel::default());
+    let wall = |name, porous, water_mm| Wall { name, porous, water_mm };
+    // The matter takes up .05 mm. Stamps leave up to twice the mean, so .02 is wet without a film.
+    let (wet, drenched) = (0.02, 0.4);
     vec![
-        Wall { name: "standard", porous: None, water_mm: 0.0 },
-        Wall { name: "dry", porous, water_mm: 0.0 },
-        Wall { name: "wet", porous, water_mm: 0.05 },
+        wall("standard", None, 0.0),
+        wall("dry", hnat, 0.0),
+        wall("hnat", hnat, wet),
+        wall("hnat, drenched", hnat, drenched),
+        wall(
+            "hnat + lekner-dorf, drenched",
+            with(WettingModel::HnatLeknerDorf(default(), default())),
+            drenched,
+        ),
+        wall("lagarde", with(WettingModel::Lagarde(default())), wet),
+        wall("lekner-dorf", with(WettingModel::LeknerDorf(default())), wet),
+        wall("twomey", with(WettingModel::Twomey(default())), wet),
+        wall("authored", with(WettingModel::Authored(default())), wet),
     ]
 }
 

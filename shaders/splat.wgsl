@@ -45,6 +45,21 @@ struct TexelState {
     wet_since: u32,
 }
 
+// A drop that fell not long ago; the twin of `RainRing` in `src/overlay/maps.rs`.
+struct RainRing {
+    // Where, 1/256 texel.
+    center: vec2<i32>,
+    // When; 0 is never.
+    tick: u32,
+    // Water, nanolitres.
+    water_nl: u32,
+}
+
+// Texels along each side of a tile.
+const TILE_SIZE: i32 = 16;
+// Drops that a tile remembers, the newest first.
+const RINGS_PER_TILE: u32 = 4u;
+
 // The twin of `SurfaceBatch` in `src/overlay/gpu/prepare.rs`.
 struct SurfaceBatch {
     // Texels along each side of the maps.
@@ -64,6 +79,7 @@ struct SurfaceBatch {
 @group(1) @binding(1) var specular_map: texture_storage_2d<rgba8unorm, read_write>;
 @group(1) @binding(2) var normal_map: texture_storage_2d<rgba8unorm, read_write>;
 @group(1) @binding(3) var<storage, read_write> state: array<TexelState>;
+@group(1) @binding(4) var<storage, read_write> rings: array<RainRing>;
 
 fn bytes_from_color(color: vec4<f32>) -> vec4<u32> {
     return vec4<u32>(color * 255.0 + 0.5);
@@ -85,6 +101,27 @@ fn paint_over(under: vec4<u32>, color: vec3<u32>, alpha: u32) -> vec4<u32> {
 
 fn unpack_bytes(packed: u32) -> vec4<u32> {
     return vec4(packed, packed >> 8u, packed >> 16u, packed >> 24u) & vec4(0xffu);
+}
+
+// Puts the newest drops that fell into a tile before those it remembers.
+fn remember_drops(tile: TileHeader, tiles_along: u32) {
+    let first = (tile.y * tiles_along + tile.x) * RINGS_PER_TILE;
+    var fallen: array<RainRing, RINGS_PER_TILE>;
+    var count = 0u;
+    for (var i = tile.count; i > 0u && count < RINGS_PER_TILE; i -= 1u) {
+        let splat = splats[splat_list[tile.start + i - 1u]];
+        let home = splat.center >> vec2(8u);
+        if splat.water_nl > 0u && all(home / TILE_SIZE == vec2(i32(tile.x), i32(tile.y))) {
+            fallen[count] = RainRing(splat.center, splat.tick, splat.water_nl);
+            count += 1u;
+        }
+    }
+    for (var slot = RINGS_PER_TILE; slot > count; slot -= 1u) {
+        rings[first + slot - 1u] = rings[first + slot - 1u - count];
+    }
+    for (var slot = 0u; slot < count; slot += 1u) {
+        rings[first + slot] = fallen[slot];
+    }
 }
 
 @compute @workgroup_size(16, 16)
@@ -129,6 +166,9 @@ fn paint_splats(
         }
     }
 
+    if all(local.xy == vec2(0u)) {
+        remember_drops(tile, batch.size / u32(TILE_SIZE));
+    }
     if changed {
         textureStore(diffuse_map, texel, color_from_bytes(diffuse));
         textureStore(specular_map, texel, color_from_bytes(specular));

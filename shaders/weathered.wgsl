@@ -1,19 +1,22 @@
 // A weathered surface: `StandardMaterial` with its overlays laid on, lit by `wet_lighting`.
+//
+// What a surface does not have is not compiled in, see `PorousKey` in `src/material/key.rs`: a dry one is lit by Bevy.
 
 #import bevy_pbr::{
     forward_io::{VertexOutput, FragmentOutput},
     decal::clustered::apply_decals,
+    pbr_bindings,
     pbr_fragment::pbr_input_from_standard_material,
-    pbr_functions::{alpha_discard, main_pass_post_lighting_processing},
+    pbr_functions::{alpha_discard, apply_pbr_lighting, main_pass_post_lighting_processing},
     pbr_types::{PbrInput, STANDARD_MATERIAL_FLAGS_UNLIT_BIT},
 }
 #import bevy_weathering::{
-    wet_lighting::{WetSurface, apply_wet_lighting},
+    wet_lighting::apply_wet_lighting,
     wet_map::{
-        porous, diffuse_map, specular_map, normal_map, map_sampler, has_flag, wetness_at,
-        FLAG_BLINN_PHONG, FLAG_SOLID, FLAG_SQRT_K,
+        porous, diffuse_map, specular_map, normal_map, map_sampler, surface_texture, surface_sampler,
+        wet_color_texture, wet_color_sampler,
     },
-    hnat::PorousParams,
+    wet_surface::{Water, apply_model, ripples, water_on},
 }
 
 #ifdef VISIBILITY_RANGE_DITHER
@@ -37,6 +40,58 @@ fn tilt_normal(normal: vec3<f32>, slopes: vec2<f32>, dp_dx: vec3<f32>, dp_dy: ve
     return normalize(normal + tilt);
 }
 
+// Colour, gloss and relief that fell on the surface, over its own.
+fn apply_paint(pbr: ptr<function, PbrInput>, in: VertexOutput) {
+#ifdef VERTEX_UVS_A
+    let diffuse = textureSample(diffuse_map, map_sampler, in.uv);
+    let base = (*pbr).material.base_color;
+    (*pbr).material.base_color = vec4(base.rgb * (1.0 - diffuse.a) + diffuse.rgb, base.a);
+    let specular = textureSample(specular_map, map_sampler, in.uv);
+    (*pbr).material.reflectance = (*pbr).material.reflectance * (1.0 - specular.a) + specular.r;
+    (*pbr).material.perceptual_roughness =
+        (*pbr).material.perceptual_roughness * (1.0 - specular.a) + (specular.a - specular.g);
+    // Premultiplied around 0.5: no coverage is no slope.
+    let normal = textureSample(normal_map, map_sampler, in.uv);
+    let slopes = 2.0 * normal.rg - normal.a;
+    (*pbr).N = tilt_normal((*pbr).N, slopes, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz),
+        dpdx(in.uv), dpdy(in.uv));
+#endif
+}
+
+#ifdef WEATHERED_LIGHT
+// The point with the water on it, lit.
+fn weathered_color(pbr_input: PbrInput, in: VertexOutput) -> vec4<f32> {
+    var pbr = pbr_input;
+    var water: Water;
+    var normal = normalize(pbr.world_normal);
+#ifdef VERTEX_UVS_A
+    let texture_uv = (pbr_bindings::material.uv_transform * vec3(in.uv, 1.0)).xy;
+    var surface = vec4(1.0);
+#ifdef WEATHERED_SURFACE_TEXTURE
+    surface = textureSample(surface_texture, surface_sampler, texture_uv);
+#endif
+    var paint = 1.0;
+#ifdef VERTEX_COLORS
+    paint = in.color.g;
+#endif
+    water = water_on(in.uv, surface.g, paint);
+    var wet_color = pbr.material.base_color.rgb;
+#ifdef WEATHERED_WET_COLOR_TEXTURE
+    wet_color = textureSample(wet_color_texture, wet_color_sampler, texture_uv).rgb;
+#endif
+    apply_model(&pbr, &water, surface.r, wet_color * porous.wet_color);
+#ifdef WEATHERED_STANDING
+    let waves = ripples(in.uv, in.world_position.xyz, water.levelness);
+    normal = tilt_normal(normal, -waves.xy, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz), dpdx(in.uv), dpdy(in.uv));
+    normal = normalize(normal - vec3(waves.z, 0.0, waves.w));
+#endif
+#endif
+    pbr.material.diffuse_transmission =
+        mix(pbr.material.diffuse_transmission, max(porous.wet_translucency, pbr.material.diffuse_transmission), water.wetness);
+    return apply_wet_lighting(pbr, water, normal);
+}
+#endif
+
 @fragment
 fn fragment(in: VertexOutput, @builtin(front_facing) is_front: bool) -> FragmentOutput {
 #ifdef VISIBILITY_RANGE_DITHER
@@ -45,43 +100,19 @@ fn fragment(in: VertexOutput, @builtin(front_facing) is_front: bool) -> Fragment
     var pbr = pbr_input_from_standard_material(in, is_front);
     pbr.material.base_color = alpha_discard(pbr.material, pbr.material.base_color);
     apply_decals(&pbr);
-
-    var wetness = 0.0;
-#ifdef VERTEX_UVS_A
-    let diffuse = textureSample(diffuse_map, map_sampler, in.uv);
-    pbr.material.base_color = vec4(
-        pbr.material.base_color.rgb * (1.0 - diffuse.a) + diffuse.rgb,
-        pbr.material.base_color.a,
-    );
-    let specular = textureSample(specular_map, map_sampler, in.uv);
-    pbr.material.reflectance = pbr.material.reflectance * (1.0 - specular.a) + specular.r;
-    pbr.material.perceptual_roughness =
-        pbr.material.perceptual_roughness * (1.0 - specular.a) + (specular.a - specular.g);
-    // Premultiplied around 0.5: no coverage is no slope.
-    let normal = textureSample(normal_map, map_sampler, in.uv);
-    let slopes = 2.0 * normal.rg - normal.a;
-    pbr.N = tilt_normal(pbr.N, slopes, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz),
-        dpdx(in.uv), dpdy(in.uv));
-    wetness = wetness_at(in.uv);
+#ifdef WEATHERED_PAINT
+    apply_paint(&pbr, in);
 #endif
 
     var out: FragmentOutput;
-    if (pbr.material.flags & STANDARD_MATERIAL_FLAGS_UNLIT_BIT) == 0u {
-        var surface: WetSurface;
-        surface.porous = PorousParams(
-            porous.alpha_poro * (1.0 - pbr.material.metallic),
-            porous.s_p,
-            porous.m,
-            porous.k_w,
-            select(0u, 1u, has_flag(FLAG_SQRT_K)),
-        );
-        surface.k_s = porous.k_s;
-        surface.tau = wetness;
-        surface.solid = has_flag(FLAG_SOLID);
-        surface.blinn_phong = has_flag(FLAG_BLINN_PHONG);
-        out.color = apply_wet_lighting(pbr, surface);
-    } else {
+    if (pbr.material.flags & STANDARD_MATERIAL_FLAGS_UNLIT_BIT) != 0u {
         out.color = pbr.material.base_color;
+    } else {
+#ifdef WEATHERED_LIGHT
+        out.color = weathered_color(pbr, in);
+#else
+        out.color = apply_pbr_lighting(pbr);
+#endif
     }
     out.color = main_pass_post_lighting_processing(pbr, out.color);
     return out;

@@ -5,10 +5,10 @@
 
 use std::mem::offset_of;
 
-use bevy::math::UVec2;
+use bevy::math::{UVec2, Vec3};
 use bevy::render::render_resource::{ShaderType, encase::UniformBuffer};
 use bevy_weathering::material::PorousUniform;
-use bevy_weathering::overlay::{Splat, SurfaceBatch, TexelState, TileHeader};
+use bevy_weathering::overlay::{RainRing, Splat, SurfaceBatch, TexelState, TileHeader};
 use naga::{Expression, Literal, Module, ScalarKind, TypeInner};
 
 const SPLAT: &str = include_str!("../shaders/splat.wgsl");
@@ -115,6 +115,13 @@ fn a_texel_is_the_same_row_for_the_painter_and_for_the_material() {
     assert_eq!(wgsl_layout(WET_MAP, "TexelState"), rust);
 }
 
+#[test]
+fn a_ring_is_the_same_row_for_the_painter_and_for_the_material() {
+    let rust = rust_layout!(RainRing { center, tick, water_nl });
+    assert_eq!(wgsl_layout(SPLAT, "RainRing"), rust);
+    assert_eq!(wgsl_layout(WET_MAP, "RainRing"), rust);
+}
+
 /// The Rust side writes `[tick, hz]`.
 #[test]
 fn the_clock_is_two_words() {
@@ -129,26 +136,55 @@ fn the_clock_is_two_words() {
 #[test]
 fn the_constants_of_a_surface_are_read_as_they_are_written() {
     let written = PorousUniform {
-        alpha_poro: 1.0,
-        s_p: 2.0,
-        m: 3.0,
-        k_s: 3.5,
-        k_w: 4.0,
-        t_fill: 5.0,
-        capacity_nl: 6.0,
-        size: 7,
-        flags: 8,
+        wet_color: Vec3::new(1.0, 2.0, 3.0),
+        wet_roughness: 4.0,
+        absorption_per_mm: Vec3::new(5.0, 6.0, 7.0),
+        wet_reflectance: 8.0,
+        flood: Vec3::new(9.0, 10.0, 11.0),
+        levelling_mm: 12.0,
+        porosity: 13.0,
+        s_p: 14.0,
+        m: 15.0,
+        k_s: 16.0,
+        k_w: 17.0,
+        film_p: 18.0,
+        film_x: 19.0,
+        backscatter: 20.0,
+        t_fill: 21.0,
+        capacity_nl: 22.0,
+        capacity_mm: 23.0,
+        wet_translucency: 24.0,
+        rain_mm_per_h: 25.0,
+        ripple_cell: 26.0,
+        texel_metres: 27.0,
+        size: 28,
+        flags: 30,
     };
-    let expected = [
-        ("alpha_poro", ScalarKind::Float, 1.0f32.to_bits()),
-        ("s_p", ScalarKind::Float, 2.0f32.to_bits()),
-        ("m", ScalarKind::Float, 3.0f32.to_bits()),
-        ("k_s", ScalarKind::Float, 3.5f32.to_bits()),
-        ("k_w", ScalarKind::Float, 4.0f32.to_bits()),
-        ("t_fill", ScalarKind::Float, 5.0f32.to_bits()),
-        ("capacity_nl", ScalarKind::Float, 6.0f32.to_bits()),
-        ("size", ScalarKind::Uint, 7),
-        ("flags", ScalarKind::Uint, 8),
+    let floats = |values: &[f32]| (ScalarKind::Float, values.iter().map(|value| value.to_bits()).collect());
+    let expected: Vec<(&str, (ScalarKind, Vec<u32>))> = vec![
+        ("wet_color", floats(&[1.0, 2.0, 3.0])),
+        ("wet_roughness", floats(&[4.0])),
+        ("absorption_per_mm", floats(&[5.0, 6.0, 7.0])),
+        ("wet_reflectance", floats(&[8.0])),
+        ("flood", floats(&[9.0, 10.0, 11.0])),
+        ("levelling_mm", floats(&[12.0])),
+        ("porosity", floats(&[13.0])),
+        ("s_p", floats(&[14.0])),
+        ("m", floats(&[15.0])),
+        ("k_s", floats(&[16.0])),
+        ("k_w", floats(&[17.0])),
+        ("film_p", floats(&[18.0])),
+        ("film_x", floats(&[19.0])),
+        ("backscatter", floats(&[20.0])),
+        ("t_fill", floats(&[21.0])),
+        ("capacity_nl", floats(&[22.0])),
+        ("capacity_mm", floats(&[23.0])),
+        ("wet_translucency", floats(&[24.0])),
+        ("rain_mm_per_h", floats(&[25.0])),
+        ("ripple_cell", floats(&[26.0])),
+        ("texel_metres", floats(&[27.0])),
+        ("size", (ScalarKind::Uint, vec![28])),
+        ("flags", (ScalarKind::Uint, vec![30])),
     ];
     let mut buffer = UniformBuffer::new(Vec::new());
     buffer.write(&written).unwrap();
@@ -156,8 +192,9 @@ fn the_constants_of_a_surface_are_read_as_they_are_written() {
 
     let Layout { fields, size } = wgsl_layout(WET_MAP, "PorousUniform");
     let read = fields.iter().map(|field| {
-        let word: [u8; 4] = bytes[field.offset as usize..][..field.size as usize].try_into().unwrap();
-        (field.name.as_str(), field.kind, u32::from_le_bytes(word))
+        let words = bytes[field.offset as usize..][..field.size as usize].chunks_exact(4);
+        let words = words.map(|word| u32::from_le_bytes(word.try_into().unwrap())).collect();
+        (field.name.as_str(), (field.kind, words))
     });
     assert_eq!(read.collect::<Vec<_>>(), expected);
     assert_eq!(u64::from(size), PorousUniform::min_size().get());
@@ -178,6 +215,11 @@ fn flags_are_the_same_bits_on_both_sides() {
         ("FLAG_BLINN_PHONG", PorousUniform::FLAG_BLINN_PHONG),
         ("FLAG_CLAMP_U", PorousUniform::FLAG_CLAMP_U),
         ("FLAG_CLAMP_V", PorousUniform::FLAG_CLAMP_V),
+        ("FLAG_ACCUMULATION", PorousUniform::FLAG_ACCUMULATION),
+        ("FLAG_LEVEL", PorousUniform::FLAG_LEVEL),
+        ("FLAG_POROSITY_TEXTURE", PorousUniform::FLAG_POROSITY_TEXTURE),
+        ("FLAG_POROSITY_GLOSS", PorousUniform::FLAG_POROSITY_GLOSS),
+        ("FLAG_METALNESS_FROM_SPECULAR", PorousUniform::FLAG_METALNESS_FROM_SPECULAR),
     ];
     assert_eq!(in_shader.collect::<Vec<_>>(), in_rust);
 }

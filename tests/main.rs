@@ -19,6 +19,8 @@ mod gpu {
     mod images;
     /// Painting.
     mod splat;
+    /// Every other function of the shaders.
+    mod twins;
 }
 /// Structs that Rust and WGSL share.
 mod layout;

@@ -1,25 +1,54 @@
-// What the maps of a surface say about a point: how wet it is now, and what lies over its material.
+// What the maps of a surface say about a point: how wet it is now, how deep water stands on it, and what falls on it.
 
 #define_import_path bevy_weathering::wet_map
 
-#import bevy_weathering::hnat::wet_tau
+#import bevy_weathering::held_water::water_look
+#import bevy_weathering::ripples::{ring_slope, RING_SECONDS}
 
 // Constants of a surface; the twin of `PorousUniform` in `src/material/extension.rs`.
 struct PorousUniform {
-    // Part of the surface that is pores, 0..=1.
-    alpha_poro: f32,
+    // Linear colour when wet, of a painted look.
+    wet_color: vec3<f32>,
+    // Perceptual roughness when wet, of a painted look.
+    wet_roughness: f32,
+    // What murky water takes away per mm.
+    absorption_per_mm: vec3<f32>,
+    // Bevy's reflectance when wet, of a painted look.
+    wet_reflectance: f32,
+    // Accumulation: levels of cracks and puddles, 0..=1. Level: level, basin, relief, mm.
+    flood: vec3<f32>,
+    // Depth over which water gets level, mm.
+    levelling_mm: f32,
+    // Part of the surface that takes up water, 0..=1; alpha_poro of a model with pores.
+    porosity: f32,
     // Shape of a pore, 0..=1.
     s_p: f32,
     // RMS slope, 0..=1.
     m: f32,
     // Part of the light that the dry surface scatters back, 0..=1.
     k_s: f32,
-    // Strength of the water's own reflection, 0..=1.
+    // Strength of the water's own reflection in pores, 0..=1.
     k_w: f32,
+    // Internal reflection of a film, 0..1.
+    film_p: f32,
+    // How much more light gets into the solid from the film than from air.
+    film_x: f32,
+    // How much less light a grain turns back in water, above 0.
+    backscatter: f32,
     // Seconds from the first water until a texel looks wet.
     t_fill: f32,
     // Nanolitres that make a texel look fully wet.
     capacity_nl: f32,
+    // The same in mm.
+    capacity_mm: f32,
+    // Diffuse transmission when soaked, 0..=1.
+    wet_translucency: f32,
+    // Rain whose drops are not simulated, mm/h.
+    rain_mm_per_h: f32,
+    // Side of the cells of that rain, metres.
+    ripple_cell: f32,
+    // Side of a texel on the surface, metres.
+    texel_metres: f32,
     // Texels along each side of the maps.
     size: u32,
     // Sum of the FLAG_ constants.
@@ -40,11 +69,35 @@ struct Clock {
     hz: u32,
 }
 
+// A drop that fell not long ago; the twin of `RainRing` in `src/overlay/maps.rs`.
+struct RainRing {
+    // Where, 1/256 texel.
+    center: vec2<i32>,
+    // When; 0 is never.
+    tick: u32,
+    // Water, nanolitres.
+    water_nl: u32,
+}
+
 const FLAG_SQRT_K: u32 = 1u;
 const FLAG_SOLID: u32 = 2u;
 const FLAG_BLINN_PHONG: u32 = 4u;
 const FLAG_CLAMP_U: u32 = 8u;
 const FLAG_CLAMP_V: u32 = 16u;
+const FLAG_ACCUMULATION: u32 = 32u;
+const FLAG_LEVEL: u32 = 64u;
+const FLAG_POROSITY_TEXTURE: u32 = 128u;
+const FLAG_POROSITY_GLOSS: u32 = 256u;
+const FLAG_METALNESS_FROM_SPECULAR: u32 = 512u;
+
+// Texels along each side of a tile, and drops that a tile remembers.
+const TILE_SIZE: i32 = 16;
+const RINGS_PER_TILE: i32 = 4;
+// How far a ring gets, and half its width, in texels: with both it stays inside the tiles around its own.
+const RING_REACH_TEXELS: f32 = 11.0;
+const RING_WIDTH_TEXELS: f32 = 4.0;
+// Water of a drop whose ring is as steep as can be, nanolitres: 5 mm across.
+const STEEPEST_DROP_NL: f32 = 65000.0;
 
 @group(#{MATERIAL_BIND_GROUP}) @binding(100) var<uniform> porous: PorousUniform;
 @group(#{MATERIAL_BIND_GROUP}) @binding(101) var diffuse_map: texture_2d<f32>;
@@ -53,37 +106,74 @@ const FLAG_CLAMP_V: u32 = 16u;
 @group(#{MATERIAL_BIND_GROUP}) @binding(104) var normal_map: texture_2d<f32>;
 @group(#{MATERIAL_BIND_GROUP}) @binding(105) var<storage, read> state: array<TexelState>;
 @group(#{MATERIAL_BIND_GROUP}) @binding(106) var<storage, read> clock: Clock;
+@group(#{MATERIAL_BIND_GROUP}) @binding(107) var<storage, read> rings: array<RainRing>;
+@group(#{MATERIAL_BIND_GROUP}) @binding(108) var surface_texture: texture_2d<f32>;
+@group(#{MATERIAL_BIND_GROUP}) @binding(109) var surface_sampler: sampler;
+@group(#{MATERIAL_BIND_GROUP}) @binding(110) var wet_color_texture: texture_2d<f32>;
+@group(#{MATERIAL_BIND_GROUP}) @binding(111) var wet_color_sampler: sampler;
 
 fn has_flag(flag: u32) -> bool {
     return (porous.flags & flag) != 0u;
 }
 
-// A texel's index along one axis, by the edge behaviour of the surface.
-fn wrapped(texel: i32, clamped: bool) -> i32 {
+// An index along one axis of a map of `size` texels or tiles, by the edge behaviour of the surface.
+fn wrapped(index: i32, size: i32, clamped: bool) -> i32 {
+    return select(((index % size) + size) % size, clamp(index, 0, size - 1), clamped);
+}
+
+// Seconds from a tick until now. In ticks first: a difference of large floats would stutter after some hours.
+fn seconds_since(tick: u32) -> f32 {
+    return f32(i32(clock.tick - tick)) / f32(clock.hz);
+}
+
+fn texel_water(texel: vec2<i32>) -> vec2<f32> {
     let size = i32(porous.size);
-    return select(((texel % size) + size) % size, clamp(texel, 0, size - 1), clamped);
+    let x = wrapped(texel.x, size, has_flag(FLAG_CLAMP_U));
+    let y = wrapped(texel.y, size, has_flag(FLAG_CLAMP_V));
+    let held = state[y * size + x];
+    return water_look(held.water_nl, seconds_since(held.wet_since), porous.capacity_nl, porous.capacity_mm, porous.t_fill);
 }
 
-// How wet one texel looks now: the paper's tau, scaled by how much water it has of what it can show.
-fn texel_wetness(texel: vec2<i32>) -> f32 {
-    let at = vec2(wrapped(texel.x, has_flag(FLAG_CLAMP_U)), wrapped(texel.y, has_flag(FLAG_CLAMP_V)));
-    let held = state[at.y * i32(porous.size) + at.x];
-    if held.water_nl == 0u {
-        return 0.0;
-    }
-    // In ticks first: a difference of large floats would stutter after some hours.
-    let since = f32(i32(clock.tick - held.wet_since)) / f32(clock.hz);
-    let filled = min(f32(held.water_nl) / porous.capacity_nl, 1.0);
-    return filled * wet_tau(since, 0.0, porous.t_fill);
-}
-
-// How wet a point looks now, 0..=1; bilinear between texels.
-fn wetness_at(uv: vec2<f32>) -> f32 {
+// How wet a point looks now, 0..=1, and the film on it in mm; bilinear between texels.
+fn water_at(uv: vec2<f32>) -> vec2<f32> {
     let position = uv * f32(porous.size) - 0.5;
     let corner = floor(position);
     let part = position - corner;
     let texel = vec2<i32>(corner);
-    let upper = mix(texel_wetness(texel), texel_wetness(texel + vec2(1, 0)), part.x);
-    let lower = mix(texel_wetness(texel + vec2(0, 1)), texel_wetness(texel + vec2(1, 1)), part.x);
+    let upper = mix(texel_water(texel), texel_water(texel + vec2(1, 0)), part.x);
+    let lower = mix(texel_water(texel + vec2(0, 1)), texel_water(texel + vec2(1, 1)), part.x);
     return mix(upper, lower, part.y);
+}
+
+// Slopes along u and v of the rings around drops that fell not long ago.
+fn drop_slopes(uv: vec2<f32>) -> vec2<f32> {
+    let size = i32(porous.size);
+    let tiles = size / TILE_SIZE;
+    let position = uv * f32(size);
+    let home = vec2<i32>(floor(position / f32(TILE_SIZE)));
+    var sum = vec2(0.0);
+    for (var i = 0; i < 9; i += 1) {
+        let tile = home + vec2(i % 3 - 1, i / 3 - 1);
+        let x = wrapped(tile.x, tiles, has_flag(FLAG_CLAMP_U));
+        let y = wrapped(tile.y, tiles, has_flag(FLAG_CLAMP_V));
+        // A clamped surface ends where its map does.
+        if (has_flag(FLAG_CLAMP_U) && x != tile.x) || (has_flag(FLAG_CLAMP_V) && y != tile.y) {
+            continue;
+        }
+        for (var slot = 0; slot < RINGS_PER_TILE; slot += 1) {
+            let ring = rings[(y * tiles + x) * RINGS_PER_TILE + slot];
+            let age = seconds_since(ring.tick) / RING_SECONDS;
+            if ring.tick == 0u || age >= 1.0 {
+                continue;
+            }
+            // The tile's copy that is nearest, on a map that repeats.
+            let center = vec2<f32>(ring.center) / 256.0 + vec2<f32>((tile - vec2(x, y)) * TILE_SIZE);
+            let away = position - center;
+            let distance = length(away);
+            let strength = sqrt(min(f32(ring.water_nl) / STEEPEST_DROP_NL, 1.0));
+            let slope = strength * ring_slope(distance, age, RING_REACH_TEXELS, RING_WIDTH_TEXELS);
+            sum += away * select(slope / distance, 0.0, distance <= 0.0);
+        }
+    }
+    return sum;
 }

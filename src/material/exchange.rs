@@ -1,17 +1,72 @@
 //! Exchanging a `StandardMaterial` for its weathered form, and keeping the two in step.
 
+use bevy::material::OpaqueRendererMethod;
 use bevy::prelude::*;
 
-use super::{ClockBuffer, PorousExtension, PorousMaterial, PorousUniform, WeatheredMaterial};
-use crate::overlay::{Overlays, TexelAreas, Weatherable};
+use super::uniform::SurfaceLook;
+use super::{
+    ClockBuffer, PorousExtension, PorousMaterial, StandingWater, WeatheredMaterial, WettingTextures,
+};
+use crate::overlay::{Overlays, SurfaceTraces, TexelAreas, Weatherable};
 
 /// The material a weathered entity had. Its asset may go on being edited: the weathered form follows.
 #[derive(Component, Reflect, Debug, Clone)]
 #[reflect(Component)]
 pub struct DryMaterial(pub Handle<StandardMaterial>);
 
-type Surface =
-    (&'static Weatherable, &'static Overlays, &'static TexelAreas, Option<&'static PorousMaterial>);
+type Surface = (
+    &'static Overlays,
+    &'static TexelAreas,
+    &'static SurfaceTraces,
+    Option<&'static PorousMaterial>,
+    Option<&'static StandingWater>,
+    Option<&'static WettingTextures>,
+);
+
+/// What changes the constants of a surface.
+type Edited = Or<(
+    Changed<PorousMaterial>,
+    Changed<StandingWater>,
+    Changed<WettingTextures>,
+    Changed<Overlays>,
+    Changed<TexelAreas>,
+    Changed<SurfaceTraces>,
+)>;
+
+fn extension(
+    (maps, areas, traces, porous, standing, textures): (
+        &Overlays,
+        &TexelAreas,
+        &SurfaceTraces,
+        Option<&PorousMaterial>,
+        Option<&StandingWater>,
+        Option<&WettingTextures>,
+    ),
+    clock: &ClockBuffer,
+) -> PorousExtension {
+    let none = WettingTextures::default();
+    let look = SurfaceLook {
+        porous: porous.copied().unwrap_or_default(),
+        standing: standing.copied(),
+        textures: textures.unwrap_or(&none),
+        maps,
+        areas,
+        traces: *traces,
+    };
+    PorousExtension::new(look.key(), look.uniform(), maps, look.textures, clock.0.clone())
+}
+
+/// The dry material as the weathered one needs it.
+fn weathered_base(dry: &StandardMaterial, extension: &PorousExtension) -> StandardMaterial {
+    let mut base = dry.clone();
+    // Deferred lighting knows no pores. Forward surfaces are drawn beside deferred ones.
+    base.opaque_render_method = OpaqueRendererMethod::Forward;
+    if extension.params.wet_translucency > 0.0 {
+        // Above 0 compiles the lighting of the far side in; how much of it is seen is the wetness's to say.
+        base.diffuse_transmission = base.diffuse_transmission.max(f32::MIN_POSITIVE);
+    }
+    base
+}
 
 /// Exchanges the material of surfaces that have their maps; also of entities that a glTF scene spawns later.
 pub(super) fn exchange_materials(
@@ -19,13 +74,15 @@ pub(super) fn exchange_materials(
     clock: Res<ClockBuffer>,
     standard: Res<Assets<StandardMaterial>>,
     mut weathered: ResMut<Assets<WeatheredMaterial>>,
-    new: Query<(Entity, Surface, &MeshMaterial3d<StandardMaterial>)>,
+    new: Query<(Entity, Surface, &MeshMaterial3d<StandardMaterial>), With<Weatherable>>,
 ) {
-    for (entity, (surface, maps, areas, porous), material) in &new {
-        let Some(base) = standard.get(material) else { continue };
-        let params = PorousUniform::new(&porous.copied().unwrap_or_default(), surface, areas.mean_mm2);
-        let extension = PorousExtension::new(params, maps, clock.0.clone());
-        let handle = weathered.add(WeatheredMaterial { base: base.clone(), extension });
+    for (entity, surface, material) in &new {
+        let Some(dry) = standard.get(material) else { continue };
+        if dry.opaque_render_method == OpaqueRendererMethod::Deferred {
+            info_once!("weathered surfaces are drawn forward, those whose material says deferred, too");
+        }
+        let extension = extension(surface, &clock);
+        let handle = weathered.add(WeatheredMaterial { base: weathered_base(dry, &extension), extension });
         commands
             .entity(entity)
             .remove::<MeshMaterial3d<StandardMaterial>>()
@@ -55,28 +112,27 @@ pub(super) fn follow_dry_materials(
 ) {
     for event in events.read() {
         let AssetEvent::Modified { id } = event else { continue };
-        let Some(base) = standard.get(*id) else { continue };
-        for (_, material) in surfaces.iter().filter(|(dry, _)| dry.0.id() == *id) {
+        let Some(dry) = standard.get(*id) else { continue };
+        for (_, material) in surfaces.iter().filter(|(material, _)| material.0.id() == *id) {
             if let Some(mut material) = weathered.get_mut(material) {
-                material.base = base.clone();
+                material.base = weathered_base(dry, &material.extension);
             }
         }
     }
 }
 
-/// Copies edits of [`PorousMaterial`], and new maps, into the weathered material.
-pub(super) fn follow_porous_materials(
+/// Copies what users edit, new maps, and the first water into the weathered material.
+pub(super) fn follow_surfaces(
+    clock: Res<ClockBuffer>,
+    standard: Res<Assets<StandardMaterial>>,
     mut weathered: ResMut<Assets<WeatheredMaterial>>,
-    changed: Query<
-        (Surface, &MeshMaterial3d<WeatheredMaterial>),
-        Or<(Changed<PorousMaterial>, Changed<Overlays>, Changed<TexelAreas>)>,
-    >,
+    changed: Query<(Surface, &DryMaterial, &MeshMaterial3d<WeatheredMaterial>), Edited>,
 ) {
-    for ((surface, maps, areas, porous), material) in &changed {
-        let params = PorousUniform::new(&porous.copied().unwrap_or_default(), surface, areas.mean_mm2);
-        if let Some(mut material) = weathered.get_mut(material) {
-            let clock = material.extension.clock.clone();
-            material.extension = PorousExtension::new(params, maps, clock);
+    for (surface, dry, material) in &changed {
+        let Some(mut material) = weathered.get_mut(material) else { continue };
+        material.extension = extension(surface, &clock);
+        if let Some(dry) = standard.get(&dry.0) {
+            material.base = weathered_base(dry, &material.extension);
         }
     }
 }

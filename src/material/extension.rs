@@ -2,21 +2,27 @@
 
 use bevy::asset::io::AssetSourceId;
 use bevy::asset::{AssetPath, embedded_path};
-use bevy::pbr::{ExtendedMaterial, MaterialExtension};
+use bevy::mesh::MeshVertexBufferLayoutRef;
+use bevy::pbr::{ExtendedMaterial, MaterialExtension, MaterialExtensionKey, MaterialExtensionPipeline};
 use bevy::prelude::*;
-use bevy::render::render_resource::{AsBindGroup, ShaderType};
+use bevy::render::render_resource::{
+    AsBindGroup, RenderPipelineDescriptor, ShaderType, SpecializedMeshPipelineError,
+};
 use bevy::render::storage::ShaderBuffer;
 use bevy::shader::ShaderRef;
 
-use super::{BaseBrdf, PorousMaterial, TextureMeaning};
-use crate::overlay::{Overlays, Weatherable, Wrap};
+use super::{PorousKey, WettingTextures};
+use crate::overlay::Overlays;
 
 /// A `StandardMaterial` that gets wet.
 pub type WeatheredMaterial = ExtendedMaterial<StandardMaterial, PorousExtension>;
 
 /// What a weathered material adds to its `StandardMaterial`. Bindings from 100 on.
 #[derive(Asset, AsBindGroup, Reflect, Debug, Clone)]
+#[bind_group_data(PorousKey)]
 pub struct PorousExtension {
+    /// What is compiled in.
+    pub key: PorousKey,
     /// Constants of the surface.
     #[uniform(100)]
     pub params: PorousUniform,
@@ -36,76 +42,69 @@ pub struct PorousExtension {
     /// See [`ClockBuffer`](super::ClockBuffer).
     #[storage(106, read_only, visibility(fragment))]
     pub clock: Handle<ShaderBuffer>,
+    /// See [`Overlays::rings`].
+    #[storage(107, read_only, visibility(fragment))]
+    pub rings: Handle<ShaderBuffer>,
+    /// See [`WettingTextures::surface`].
+    #[texture(108)]
+    #[sampler(109)]
+    pub surface: Option<Handle<Image>>,
+    /// See [`WettingTextures::wet_color`].
+    #[texture(110)]
+    #[sampler(111)]
+    pub wet_color: Option<Handle<Image>>,
 }
 
-/// [`PorousMaterial`] as the shader reads it: `PorousUniform` in `shaders/common/wet_map.wgsl`.
+/// [`PorousMaterial`](super::PorousMaterial) and [`StandingWater`](super::StandingWater) as the shader reads them:
+/// `PorousUniform` in `shaders/common/wet_map.wgsl`, where the fields are told.
 #[derive(ShaderType, Reflect, Debug, Clone, Copy, Default, PartialEq)]
+#[expect(missing_docs, reason = "told in the shader; tests/layout.rs compares the two")]
 pub struct PorousUniform {
-    /// [`PorousMaterial::alpha_poro`].
-    pub alpha_poro: f32,
-    /// [`PorousMaterial::s_p`].
+    pub wet_color: Vec3,
+    pub wet_roughness: f32,
+    pub absorption_per_mm: Vec3,
+    pub wet_reflectance: f32,
+    pub flood: Vec3,
+    pub levelling_mm: f32,
+    pub porosity: f32,
     pub s_p: f32,
-    /// [`PorousMaterial::m`].
     pub m: f32,
-    /// [`PorousMaterial::k_s`].
     pub k_s: f32,
-    /// [`PorousMaterial::k_w`].
     pub k_w: f32,
-    /// [`PorousMaterial::t_fill`], seconds.
+    pub film_p: f32,
+    pub film_x: f32,
+    pub backscatter: f32,
     pub t_fill: f32,
-    /// Nanolitres in a texel of mean size that make it look fully wet.
     pub capacity_nl: f32,
-    /// Texels along each side of the maps.
+    pub capacity_mm: f32,
+    pub wet_translucency: f32,
+    pub rain_mm_per_h: f32,
+    pub ripple_cell: f32,
+    pub texel_metres: f32,
     pub size: u32,
-    /// Sum of the `FLAG_` constants.
     pub flags: u32,
-}
-
-impl PorousUniform {
-    /// [`PorousMaterial::sqrt_k`].
-    pub const FLAG_SQRT_K: u32 = 1;
-    /// [`TextureMeaning::Solid`].
-    pub const FLAG_SOLID: u32 = 2;
-    /// [`BaseBrdf::BlinnPhong`].
-    pub const FLAG_BLINN_PHONG: u32 = 4;
-    /// [`Wrap::Clamp`] along u.
-    pub const FLAG_CLAMP_U: u32 = 8;
-    /// [`Wrap::Clamp`] along v.
-    pub const FLAG_CLAMP_V: u32 = 16;
-
-    /// Constants for a surface whose texels are `texel_mm2` large on average.
-    pub fn new(porous: &PorousMaterial, surface: &Weatherable, texel_mm2: f32) -> Self {
-        let flag = |set: bool, flag: u32| if set { flag } else { 0 };
-        let unit = |value: f32| value.clamp(0.0, 1.0);
-        Self {
-            alpha_poro: unit(porous.alpha_poro),
-            s_p: unit(porous.s_p),
-            m: unit(porous.m),
-            k_s: unit(porous.k_s),
-            k_w: unit(porous.k_w),
-            t_fill: porous.t_fill.max(0.0),
-            // 1 mm on 1 mm² is 1 µl.
-            capacity_nl: (porous.capacity_mm * texel_mm2 * 1000.0).max(1.0),
-            size: surface.texels(),
-            flags: flag(porous.sqrt_k, Self::FLAG_SQRT_K)
-                | flag(porous.texture == TextureMeaning::Solid, Self::FLAG_SOLID)
-                | flag(porous.brdf == BaseBrdf::BlinnPhong, Self::FLAG_BLINN_PHONG)
-                | flag(surface.wrap_u == Wrap::Clamp, Self::FLAG_CLAMP_U)
-                | flag(surface.wrap_v == Wrap::Clamp, Self::FLAG_CLAMP_V),
-        }
-    }
 }
 
 impl PorousExtension {
     /// Binds the maps of a surface.
-    pub fn new(params: PorousUniform, maps: &Overlays, clock: Handle<ShaderBuffer>) -> Self {
+    pub fn new(
+        key: PorousKey,
+        params: PorousUniform,
+        maps: &Overlays,
+        textures: &WettingTextures,
+        clock: Handle<ShaderBuffer>,
+    ) -> Self {
         Self {
+            key,
             params,
             diffuse: maps.diffuse.clone(),
             specular: maps.specular.clone(),
             normal: maps.normal.clone(),
             state: maps.state.clone(),
             clock,
+            rings: maps.rings.clone(),
+            surface: textures.surface.clone(),
+            wet_color: textures.wet_color.clone(),
         }
     }
 }
@@ -114,5 +113,17 @@ impl MaterialExtension for PorousExtension {
     fn fragment_shader() -> ShaderRef {
         let path = AssetPath::from_path_buf(embedded_path!("../../shaders/weathered.wgsl"));
         path.with_source(AssetSourceId::from("embedded")).into()
+    }
+
+    fn specialize(
+        _: &MaterialExtensionPipeline,
+        descriptor: &mut RenderPipelineDescriptor,
+        _: &MeshVertexBufferLayoutRef,
+        key: MaterialExtensionKey<Self>,
+    ) -> Result<(), SpecializedMeshPipelineError> {
+        if let Some(fragment) = &mut descriptor.fragment {
+            fragment.shader_defs.extend(key.bind_group_data.shader_defs());
+        }
+        Ok(())
     }
 }

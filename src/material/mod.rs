@@ -15,98 +15,56 @@ mod clock;
 mod exchange;
 mod extension;
 pub mod film;
+mod key;
 pub mod models;
+mod porous;
+mod ranges;
+mod standing;
+mod uniform;
 
 use bevy::asset::{AssetEventSystems, embedded_asset};
 use bevy::pbr::MaterialPlugin;
 use bevy::prelude::*;
 use bevy::render::RenderApp;
 use bevy::shader::load_shader_library;
-use serde::{Deserialize, Serialize};
+
+use crate::overlay::deposit::note_traces;
 
 pub use clock::ClockBuffer;
 pub use exchange::DryMaterial;
 pub use extension::{PorousExtension, PorousUniform, WeatheredMaterial};
-
-/// How a surface takes up water and looks with it. On an entity with [`Weatherable`](crate::overlay::Weatherable);
-/// without it, the default is used.
-#[derive(Component, Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
-#[reflect(Component)]
-#[serde(deny_unknown_fields, default)]
-pub struct PorousMaterial {
-    /// α_poro, the part of the surface that is pores; 0 (glazed) to 1.
-    pub alpha_poro: f32,
-    /// s_p, shape of a pore from deep (near 0) to shallow (1). Deep pores are dark when dry already, so .005 to
-    /// .15 show wetness best.
-    pub s_p: f32,
-    /// m, RMS slope of the surface between pores, 0..=1.
-    pub m: f32,
-    /// k_s, the part of the light that the dry surface scatters back without entering it, 0..=1. What of it falls
-    /// into pores is a whitish veil over the dry colour, which water takes away: the more, the more saturated wet.
-    pub k_s: f32,
-    /// k_w, strength of the water's own reflection, 0..=1.
-    pub k_w: f32,
-    /// Uses k = sqrt(2 m²/π) (Schlick 1994) instead of k = 2 m²/π as printed.
-    pub sqrt_k: bool,
-    /// Seconds from the first water in a texel until it looks wet; 0 is at once.
-    pub t_fill: f32,
-    /// Water, in mm, at which a texel looks fully wet.
-    pub capacity_mm: f32,
-    /// What the base colour shows.
-    pub texture: TextureMeaning,
-    /// The BRDF that is post-processed.
-    pub brdf: BaseBrdf,
-}
-
-/// What a base colour texture is a picture of.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum TextureMeaning {
-    /// The porous surface, dry: a photograph. Wetness multiplies by `kd_w / kd'`.
-    #[default]
-    DryLook,
-    /// The solid between the pores. Porosity darkens it dry, too.
-    Solid,
-}
-
-/// The BRDF under the post-process.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum BaseBrdf {
-    /// Bevy's own: GGX and Burley's diffuse.
-    #[default]
-    Ggx,
-    /// Blinn-Phong and Lambert, as in the paper.
-    BlinnPhong,
-}
-
-impl Default for PorousMaterial {
-    /// Terracotta-like.
-    fn default() -> Self {
-        Self {
-            alpha_poro: 0.5,
-            s_p: 0.02,
-            m: 0.35,
-            k_s: 0.04,
-            k_w: 0.9,
-            sqrt_k: false,
-            t_fill: 0.4,
-            capacity_mm: 0.05,
-            texture: TextureMeaning::DryLook,
-            brdf: BaseBrdf::Ggx,
-        }
-    }
-}
+pub use key::{ModelKind, PorousKey};
+pub use porous::{
+    BaseBrdf, Coated, Grains, Pores, PorositySource, PorousMaterial, TextureMeaning, Tweaked, WetLook,
+    WettingModel, WettingTextures,
+};
+pub use ranges::OutOfRange;
+pub use standing::{Flood, StandingWater};
 
 /// Draws weathered surfaces. Does nothing without a render app.
 pub struct PorousMaterialPlugin;
 
 impl Plugin for PorousMaterialPlugin {
     fn build(&self, app: &mut App) {
-        app.register_type::<PorousMaterial>();
+        app.register_type::<PorousMaterial>()
+            .register_type::<WettingTextures>()
+            .register_type::<StandingWater>();
         if app.get_sub_app(RenderApp).is_none() {
             return;
         }
         load_shader_library!(app, "../../shaders/common/hnat.wgsl");
+        load_shader_library!(app, "../../shaders/common/lagarde.wgsl");
+        load_shader_library!(app, "../../shaders/common/lekner_dorf.wgsl");
+        load_shader_library!(app, "../../shaders/common/twomey.wgsl");
+        load_shader_library!(app, "../../shaders/common/film_on_pores.wgsl");
+        load_shader_library!(app, "../../shaders/common/authored.wgsl");
+        load_shader_library!(app, "../../shaders/common/water_film.wgsl");
+        load_shader_library!(app, "../../shaders/common/flood.wgsl");
+        load_shader_library!(app, "../../shaders/common/ripples.wgsl");
+        load_shader_library!(app, "../../shaders/common/held_water.wgsl");
         load_shader_library!(app, "../../shaders/common/wet_map.wgsl");
+        load_shader_library!(app, "../../shaders/common/wet_surface.wgsl");
+        load_shader_library!(app, "../../shaders/common/wet_layers.wgsl");
         load_shader_library!(app, "../../shaders/common/wet_lighting.wgsl");
         embedded_asset!(app, "../../shaders/weathered.wgsl");
         app.add_plugins(MaterialPlugin::<WeatheredMaterial>::default())
@@ -114,12 +72,10 @@ impl Plugin for PorousMaterialPlugin {
             .add_observer(exchange::release_surface)
             .add_systems(
                 PostUpdate,
-                (
-                    exchange::exchange_materials,
-                    exchange::follow_dry_materials,
-                    exchange::follow_porous_materials,
-                )
+                (exchange::exchange_materials, exchange::follow_dry_materials, exchange::follow_surfaces)
                     .chain()
+                    // The first water is drawn in the frame in which it comes.
+                    .after(note_traces)
                     // What is added here is drawn in this frame.
                     .before(AssetEventSystems),
             );

@@ -12,32 +12,52 @@ use crate::schedule::{WeatheringSystems, WeatheringTick};
 /// Splats of a surface that nobody has painted yet, in the order of their impacts. A frame may hold any number of
 /// ticks: each adds its own; the painter empties it.
 #[derive(Component, Debug, Default)]
-pub struct SplatQueue(Vec<Splat>);
+pub struct SplatQueue {
+    splats: Vec<Splat>,
+    traces: SurfaceTraces,
+}
+
+/// What has ever come to a surface. What has not come need not be looked for when it is drawn.
+#[derive(Component, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[reflect(Component)]
+pub struct SurfaceTraces {
+    /// Water.
+    pub water: bool,
+    /// Colour, gloss or relief.
+    pub paint: bool,
+}
 
 impl SplatQueue {
     /// The waiting splats.
     pub fn splats(&self) -> &[Splat] {
-        &self.0
+        &self.splats
     }
 
     /// Adds a splat behind the others.
     pub fn push(&mut self, splat: Splat) {
-        self.0.push(splat);
+        self.traces.water |= splat.water_nl > 0;
+        self.traces.paint |= splat.diffuse >> 24 > 0 || splat.specular >> 24 > 0 || splat.bump_opacity > 0;
+        self.splats.push(splat);
+    }
+
+    /// What has ever been pushed.
+    pub fn traces(&self) -> SurfaceTraces {
+        self.traces
     }
 
     /// Whether nothing waits.
     pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.splats.is_empty()
     }
 
     /// Forgets the splats, keeping the memory.
     pub fn clear(&mut self) {
-        self.0.clear();
+        self.splats.clear();
     }
 
     /// Moves the splats behind those in `painter`.
     pub fn drain_into(&mut self, painter: &mut Vec<Splat>) {
-        painter.append(&mut self.0);
+        painter.append(&mut self.splats);
     }
 }
 
@@ -58,9 +78,12 @@ impl Plugin for DepositPlugin {
     fn build(&self, app: &mut App) {
         app.register_type::<Weatherable>()
             .register_type::<SurfaceTotals>()
+            .register_type::<SurfaceTraces>()
             .register_required_components::<Weatherable, SplatQueue>()
             .register_required_components::<Weatherable, SurfaceTotals>()
+            .register_required_components::<Weatherable, SurfaceTraces>()
             .add_systems(PreUpdate, measure_texels)
+            .add_systems(PostUpdate, note_traces)
             .add_systems(WeatheringTick, deposit_splats.in_set(WeatheringSystems::Deposit));
     }
 }
@@ -78,6 +101,13 @@ pub(super) fn measure_texels(
         let areas =
             TexelAreas::new(collider.0.triangles(), &transform.affine(), surface.texels(), surface.wrap());
         commands.entity(entity).insert(areas);
+    }
+}
+
+/// Tells those who draw what has come.
+pub(crate) fn note_traces(mut surfaces: Query<(&SplatQueue, &mut SurfaceTraces), Changed<SplatQueue>>) {
+    for (queue, mut traces) in &mut surfaces {
+        traces.set_if_neq(queue.traces());
     }
 }
 

@@ -27,6 +27,24 @@ impl TexelState {
     }
 }
 
+/// A drop that fell not long ago, for the ring around it. A row of the GPU's ring buffer; each tile of the map remembers
+/// its last [`Self::PER_TILE`], the newest first.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
+pub struct RainRing {
+    /// Where it fell, in 1/256 texel of the map.
+    pub center: [i32; 2],
+    /// When; 0 is never.
+    pub tick: u32,
+    /// Water, nanolitres.
+    pub water_nl: u32,
+}
+
+impl RainRing {
+    /// Drops that a tile remembers.
+    pub const PER_TILE: u32 = 4;
+}
+
 /// World area that each texel of a surface stands for; 0 where no triangle lies.
 #[derive(Component, Debug, Clone, PartialEq)]
 pub struct TexelAreas {

@@ -26,9 +26,9 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub use cpu::{CpuMaps, CpuOverlayPlugin};
-pub use deposit::{DepositPlugin, SplatQueue, SurfaceTotals, deposit_splats};
+pub use deposit::{DepositPlugin, SplatQueue, SurfaceTotals, SurfaceTraces, deposit_splats};
 pub use gpu::{GpuOverlayPlugin, Overlays, SplatStats, SurfaceBatch};
-pub use maps::{TexelAreas, TexelState};
+pub use maps::{RainRing, TexelAreas, TexelState};
 pub use splat::Splat;
 pub use tiles::{TILE_SIZE, TileBins, TileHeader};
 

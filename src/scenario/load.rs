@@ -2,6 +2,8 @@
 
 use std::path::{Component, Path, PathBuf};
 
+use ron::extensions::Extensions;
+
 use super::{Scenario, ScenarioError};
 
 /// A scenario that passed every check that needs no scene.
@@ -30,9 +32,9 @@ impl Scenario {
             return Err(ScenarioError::TooLarge { file: file.into(), size, max: Self::MAX_FILE_BYTES });
         }
         let bytes = std::fs::read(file).map_err(read)?;
-        // A missing optional value may be written without `Some`.
-        let options =
-            ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
+        // An optional value may be written without `Some`, a model's parameters without a second pair of brackets.
+        let options = ron::Options::default()
+            .with_default_extension(Extensions::IMPLICIT_SOME | Extensions::UNWRAP_VARIANT_NEWTYPES);
         let scenario: Self = options
             .from_bytes(&bytes)
             .map_err(|source| ScenarioError::Parse { file: file.into(), source: source.into() })?;

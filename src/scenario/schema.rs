@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::emitter::EmitterShape;
-use crate::material::PorousMaterial;
+use crate::material::{PorousMaterial, StandingWater};
 use crate::overlay::Weatherable;
 use crate::scenes::stone::Stone;
 
@@ -176,6 +176,8 @@ pub struct MaterialSpec {
     pub metallic: f32,
     /// How it gets wet.
     pub porous: PorousMaterial,
+    /// Water that stands on it.
+    pub water: StandingWater,
 }
 
 impl Default for MaterialSpec {
@@ -188,6 +190,7 @@ impl Default for MaterialSpec {
             reflectance: 0.5,
             metallic: 0.0,
             porous: PorousMaterial::default(),
+            water: StandingWater::default(),
         }
     }
 }

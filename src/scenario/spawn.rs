@@ -150,7 +150,7 @@ fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, loo
             GlobalTransform::from(transform),
         ));
         if let Some(material) = scenario.materials.get(&spec.material) {
-            entity.insert(material.porous);
+            entity.insert((material.porous, material.water));
         }
         if let Some((_, material)) = materials.iter().find(|(name, _)| **name == spec.material) {
             entity.insert(MeshMaterial3d(material.clone()));

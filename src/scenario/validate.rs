@@ -10,6 +10,7 @@ use super::{
 };
 use crate::clock::WeatheringClock;
 use crate::emitter::EmitterShape;
+use crate::material::OutOfRange;
 use crate::overlay::{TILE_SIZE, Weatherable};
 use crate::particle::Lifespan;
 
@@ -74,22 +75,23 @@ impl LoadedScenario {
     }
 
     fn validate_material(&self, field: &str, material: &MaterialSpec) -> Result<(), ScenarioError> {
-        let porous = &material.porous;
         self.color(&format!("{field}.color"), material.color)?;
         for (name, value) in [
             ("roughness", material.roughness),
             ("reflectance", material.reflectance),
             ("metallic", material.metallic),
-            ("porous.alpha_poro", porous.alpha_poro),
-            ("porous.s_p", porous.s_p),
-            ("porous.m", porous.m),
-            ("porous.k_s", porous.k_s),
-            ("porous.k_w", porous.k_w),
         ] {
             self.not_negative(&format!("{field}.{name}"), value, 1.0)?;
         }
-        self.not_negative(&format!("{field}.porous.t_fill"), porous.t_fill, Scenario::MAX_SECONDS)?;
-        self.positive(&format!("{field}.porous.capacity_mm"), porous.capacity_mm, 1000.0)?;
+        for (name, checked) in [("porous", material.porous.validate()), ("water", material.water.validate())]
+        {
+            let OutOfRange { field: inner, value, least, most } = match checked {
+                Ok(()) => continue,
+                Err(error) => error,
+            };
+            let expected = format!("{least} to {most}");
+            return Err(self.value(format!("{field}.{name}.{inner}"), value, expected));
+        }
         self.positive(&format!("{field}.tiles.x"), material.tiles.x, 1.0e4)?;
         self.positive(&format!("{field}.tiles.y"), material.tiles.y, 1.0e4)?;
         match &material.texture {

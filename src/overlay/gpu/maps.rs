@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat, TextureUsages};
 use bevy::render::storage::ShaderBuffer;
 
-use crate::overlay::{TexelState, Weatherable, Wrap};
+use crate::overlay::{RainRing, TILE_SIZE, TexelState, Weatherable, Wrap};
 
 /// The maps of a surface on the GPU. Begin empty; all zeros mean "nothing here".
 #[derive(Component, Reflect, Debug, Clone)]
@@ -24,6 +24,8 @@ pub struct Overlays {
     pub normal: Handle<Image>,
     /// [`TexelState`] of each texel, row by row.
     pub state: Handle<ShaderBuffer>,
+    /// [`RainRing::PER_TILE`] [`RainRing`]s of each tile, row by row.
+    pub rings: Handle<ShaderBuffer>,
 }
 
 impl Overlays {
@@ -32,10 +34,12 @@ impl Overlays {
         let mut image = |name| images.add(overlay_image(size, surface.wrap(), name));
         let (diffuse, specular, normal) =
             (image("diffuse overlay"), image("specular overlay"), image("normal overlay"));
-        let bytes = (size * size) as usize * size_of::<TexelState>();
         // wgpu zeroes what is created without data.
-        let state = buffers.add(ShaderBuffer::with_size(bytes, RenderAssetUsages::RENDER_WORLD));
-        Self { size, wrap: surface.wrap(), diffuse, specular, normal, state }
+        let mut buffer = |bytes| buffers.add(ShaderBuffer::with_size(bytes, RenderAssetUsages::RENDER_WORLD));
+        let state = buffer((size * size) as usize * size_of::<TexelState>());
+        let tiles = (size / TILE_SIZE).pow(2);
+        let rings = buffer((tiles * RainRing::PER_TILE) as usize * size_of::<RainRing>());
+        Self { size, wrap: surface.wrap(), diffuse, specular, normal, state, rings }
     }
 }
 

@@ -17,6 +17,7 @@ use bevy::render::{ExtractSchedule, Render, RenderApp, RenderStartup, RenderSyst
 use bevy::shader::load_shader_library;
 
 use super::SplatQueue;
+use super::deposit::note_traces;
 
 pub use maps::Overlays;
 pub use prepare::{SplatStats, SurfaceBatch};
@@ -28,7 +29,7 @@ pub struct GpuOverlayPlugin;
 impl Plugin for GpuOverlayPlugin {
     fn build(&self, app: &mut App) {
         if app.get_sub_app(RenderApp).is_none() {
-            app.add_systems(PostUpdate, discard_splats);
+            app.add_systems(PostUpdate, discard_splats.after(note_traces));
             return;
         }
         load_shader_library!(app, "../../../shaders/common/kernel.wgsl");

@@ -83,6 +83,7 @@ struct Maps {
     wrap: [Wrap; 2],
     images: [AssetId<Image>; 3],
     state: AssetId<ShaderBuffer>,
+    rings: AssetId<ShaderBuffer>,
 }
 
 impl From<&Overlays> for Maps {
@@ -92,6 +93,7 @@ impl From<&Overlays> for Maps {
             wrap: overlays.wrap,
             images: [overlays.diffuse.id(), overlays.specular.id(), overlays.normal.id()],
             state: overlays.state.id(),
+            rings: overlays.rings.id(),
         }
     }
 }
@@ -186,10 +188,14 @@ pub(super) fn prepare_splats(
     tiles.clear();
     list.clear();
     for waiting in pending.surfaces.iter_mut().filter(|surface| !surface.splats.is_empty()) {
-        let Maps { size, wrap, images: [diffuse, specular, normal], state } = waiting.maps;
-        let (Some(diffuse), Some(specular), Some(normal), Some(state)) =
-            (images.get(diffuse), images.get(specular), images.get(normal), buffers.get(state))
-        else {
+        let Maps { size, wrap, images: [diffuse, specular, normal], state, rings } = waiting.maps;
+        let (Some(diffuse), Some(specular), Some(normal), Some(state), Some(rings)) = (
+            images.get(diffuse),
+            images.get(specular),
+            images.get(normal),
+            buffers.get(state),
+            buffers.get(rings),
+        ) else {
             continue;
         };
         let first_tile = tiles.len() as u32;
@@ -207,6 +213,7 @@ pub(super) fn prepare_splats(
                     &specular.texture_view,
                     &normal.texture_view,
                     state.buffer.as_entire_buffer_binding(),
+                    rings.buffer.as_entire_buffer_binding(),
                 )),
             ),
             batch_offset: batches.push(&SurfaceBatch { size, first_tile, clamped }),
@@ -247,6 +254,7 @@ mod tests {
             specular: default(),
             normal: default(),
             state: default(),
+            rings: default(),
         };
         let surface = main.spawn((overlays, SplatQueue::default())).id();
         let mut render = World::new();

@@ -1,0 +1,202 @@
+//! Wet models, films, floods and ripples: every function of the shaders against its double-precision twin.
+
+use bevy_weathering::material::film::{flood, held, layer, ripples};
+use bevy_weathering::material::models::{authored, film_on_pores, lagarde, lekner_dorf, twomey};
+
+use super::harness;
+
+const SOURCES: [(&str, &str); 10] = [
+    ("hnat.wgsl", include_str!("../../shaders/common/hnat.wgsl")),
+    ("lagarde.wgsl", include_str!("../../shaders/common/lagarde.wgsl")),
+    ("lekner_dorf.wgsl", include_str!("../../shaders/common/lekner_dorf.wgsl")),
+    ("twomey.wgsl", include_str!("../../shaders/common/twomey.wgsl")),
+    ("authored.wgsl", include_str!("../../shaders/common/authored.wgsl")),
+    ("film_on_pores.wgsl", include_str!("../../shaders/common/film_on_pores.wgsl")),
+    ("water_film.wgsl", include_str!("../../shaders/common/water_film.wgsl")),
+    ("flood.wgsl", include_str!("../../shaders/common/flood.wgsl")),
+    ("ripples.wgsl", include_str!("../../shaders/common/ripples.wgsl")),
+    ("held_water.wgsl", include_str!("../../shaders/common/held_water.wgsl")),
+];
+
+/// Random numbers of one input, each in `[0, 1)`.
+const NUMBERS: usize = 8;
+
+const INPUTS: usize = 10_000;
+
+/// One function: an expression over `x: array<f32, 8>` in WGSL, and the same over `x: &[f64; 8]` in Rust.
+struct Twin {
+    wgsl: &'static str,
+    rust: fn(&[f64; NUMBERS]) -> f64,
+}
+
+const TWINS: &[Twin] = &[
+    Twin { wgsl: "lagarde::kept_albedo(x[0], x[1])", rust: |x| lagarde::kept_albedo(x[0], x[1]) },
+    Twin {
+        wgsl: "lagarde::wet_albedo(vec3(x[0]), x[1], x[2]).y",
+        rust: |x| lagarde::wet_albedo(x[0], x[1], x[2]),
+    },
+    Twin { wgsl: "lagarde::wet_gloss(x[0], x[1], x[2])", rust: |x| lagarde::wet_gloss(x[0], x[1], x[2]) },
+    Twin { wgsl: "lagarde::porosity_from_gloss(x[0])", rust: |x| lagarde::porosity_from_gloss(x[0]) },
+    Twin {
+        wgsl: "lagarde::porosity_from_mask(x[0], x[1])",
+        rust: |x| lagarde::porosity_from_mask(x[0], x[1]),
+    },
+    Twin {
+        // A step: near it single precision decides otherwise.
+        wgsl: "lagarde::metalness_from_specular(vec3(x[0], x[1], x[2])) * f32(abs(x[0] + x[1] + x[2] - 1.5167) > 1e-4)",
+        rust: |x| {
+            let away = (x[0] + x[1] + x[2] - 1.5167).abs() > 1e-4;
+            lagarde::metalness_from_specular([x[0], x[1], x[2]]) * f64::from(u8::from(away))
+        },
+    },
+    Twin { wgsl: "lagarde::roughness_from_gloss(x[0])", rust: |x| lagarde::roughness_from_gloss(x[0]) },
+    Twin { wgsl: "lagarde::gloss_from_roughness(x[0])", rust: |x| lagarde::gloss_from_roughness(x[0]) },
+    Twin {
+        wgsl: "lagarde::wet_roughness(x[0], x[1], x[2])",
+        rust: |x| lagarde::wet_roughness(x[0], x[1], x[2]),
+    },
+    Twin {
+        wgsl: "lekner_dorf::wet_absorption(vec3(x[0]), 1.0 + 0.2 * x[1]).z",
+        rust: |x| lekner_dorf::wet_absorption(x[0], 1.0 + 0.2 * x[1]),
+    },
+    Twin {
+        wgsl: "lekner_dorf::wet_diffuse(vec3(x[0]), 1.0 + 0.2 * x[1], 0.9 * x[2]).x",
+        rust: |x| lekner_dorf::wet_diffuse(x[0], 1.0 + 0.2 * x[1], 0.9 * x[2]),
+    },
+    Twin {
+        wgsl: "twomey::wet_albedo(vec3(x[0]), 0.05 + 0.95 * x[1]).y",
+        rust: |x| twomey::wet_albedo(x[0], 0.05 + 0.95 * x[1]),
+    },
+    Twin {
+        wgsl: "authored::authored(vec3(x[0]), vec3(x[1]), x[2]).x",
+        rust: |x| authored::authored(x[0], x[1], x[2]),
+    },
+    Twin {
+        wgsl: "film_on_pores::film_darkening(vec3(x[0]), x[1], x[2], 1.0 + 0.2 * x[3], 0.9 * x[4], x[5]).x",
+        rust: |x| film_on_pores::film_darkening(x[0], x[1], x[2], 1.0 + 0.2 * x[3], 0.9 * x[4], x[5]),
+    },
+    Twin {
+        wgsl: "water_film::fresnel(x[0], x[1] * 1.2 - 0.1)",
+        rust: |x| layer::fresnel(x[0], x[1] * 1.2 - 0.1),
+    },
+    Twin { wgsl: "water_film::mean_fresnel(x[0])", rust: |x| layer::mean_fresnel(x[0]) },
+    Twin {
+        wgsl: "water_film::reflectance_under_water(vec3(x[0])).x",
+        rust: |x| layer::reflectance_under_water(x[0]),
+    },
+    Twin {
+        wgsl: "water_film::film_coverage(x[0] * 0.3 - 0.05)",
+        rust: |x| layer::film_coverage(x[0] * 0.3 - 0.05),
+    },
+    Twin {
+        wgsl: "water_film::film_levelness(2.0 * x[0], 0.1 + x[1])",
+        rust: |x| layer::film_levelness(2.0 * x[0], 0.1 + x[1]),
+    },
+    Twin {
+        wgsl: "water_film::film_transmission(x[0], x[1], x[2])",
+        rust: |x| layer::film_transmission(x[0], x[1], x[2]),
+    },
+    Twin {
+        wgsl: "water_film::film_diffuse_transmission(x[0], x[1], x[2])",
+        rust: |x| layer::film_diffuse_transmission(x[0], x[1], x[2]),
+    },
+    Twin {
+        wgsl: "water_film::murk(vec3(x[0]), 3.0 * x[1], x[2], x[3]).z",
+        rust: |x| layer::murk(x[0], 3.0 * x[1], x[2], x[3]),
+    },
+    Twin {
+        wgsl: "flood::accumulated(x[0], x[1], x[2], x[3])",
+        rust: |x| flood::accumulated(x[0], x[1], x[2], x[3]),
+    },
+    Twin {
+        wgsl: "flood::flood_depth(3.0 * x[0], 2.0 * x[1], x[2], x[3], x[4])",
+        rust: |x| flood::flood_depth(3.0 * x[0], 2.0 * x[1], x[2], x[3], x[4]),
+    },
+    Twin {
+        wgsl: "dot(flood::region_weights(x[0], x[1], x[2]), vec4(1.0, 10.0, 100.0, 1000.0)) / 1000.0",
+        rust: |x| {
+            let [dry, wet, drenched, puddle] = flood::region_weights(x[0], x[1], x[2]);
+            (dry + 10.0 * wet + 100.0 * drenched + 1000.0 * puddle) / 1000.0
+        },
+    },
+    Twin {
+        wgsl: "ripples::ring_slope(x[0], x[1] * 1.2 - 0.1, 0.5, 0.3)",
+        rust: |x| ripples::ring_slope(x[0], x[1] * 1.2 - 0.1, 0.5, 0.3),
+    },
+    Twin {
+        wgsl: "dot(ripples::layer_weights(30.0 * x[0]), vec4(0.1, 0.2, 0.3, 0.4))",
+        rust: |x| {
+            let weights = ripples::layer_weights(30.0 * x[0]);
+            weights.iter().zip([0.1, 0.2, 0.3, 0.4]).map(|(weight, share)| weight * share).sum()
+        },
+    },
+    Twin {
+        wgsl: "ripples::rain_slopes(vec2(20.0 * x[0] - 10.0, 20.0 * x[1] - 10.0), 60.0 * x[2], 30.0 * x[3]).x",
+        rust: |x| ripples::rain_slopes([20.0 * x[0] - 10.0, 20.0 * x[1] - 10.0], 60.0 * x[2], 30.0 * x[3])[0],
+    },
+    Twin {
+        wgsl: "ripples::rain_slopes(vec2(20.0 * x[0] - 10.0, 20.0 * x[1] - 10.0), 60.0 * x[2], 30.0 * x[3]).y",
+        rust: |x| ripples::rain_slopes([20.0 * x[0] - 10.0, 20.0 * x[1] - 10.0], 60.0 * x[2], 30.0 * x[3])[1],
+    },
+    Twin {
+        wgsl: "held_water::water_look(u32(x[0] * 1000.0), x[1], 300.0, 0.1, x[2]).x",
+        rust: |x| held::water_look((x[0] * 1000.0) as u32, x[1], 300.0, 0.1, x[2]).0,
+    },
+    Twin {
+        wgsl: "held_water::water_look(u32(x[0] * 1000.0), x[1], 300.0, 0.1, x[2]).y",
+        rust: |x| held::water_look((x[0] * 1000.0) as u32, x[1], 300.0, 0.1, x[2]).1,
+    },
+];
+
+fn inputs() -> Vec<[f32; NUMBERS]> {
+    let mut state = 0x1234_5678u32;
+    let mut random = || {
+        state = ripples::pcg(state.wrapping_add(0x9e37_79b9));
+        // 24 bits: exact in both precisions.
+        (state >> 8) as f32 / (1 << 24) as f32
+    };
+    (0..INPUTS).map(|_| std::array::from_fn(|_| random())).collect()
+}
+
+#[test]
+fn shaders_match_their_twins() {
+    let Some(gpu) = harness::gpu() else { return };
+    let imports: String = SOURCES
+        .iter()
+        .map(|(file, _)| format!("#import bevy_weathering::{}\n", file.trim_end_matches(".wgsl")))
+        .collect();
+    let calls: String = TWINS
+        .iter()
+        .enumerate()
+        .map(|(i, twin)| format!("    outputs[id.x][{i}] = {};\n", twin.wgsl))
+        .collect();
+    let entry = format!(
+        "{imports}
+@group(0) @binding(0) var<storage, read> inputs: array<array<f32, {NUMBERS}>>;
+@group(0) @binding(1) var<storage, read_write> outputs: array<array<f32, {}>>;
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
+    if id.x >= arrayLength(&inputs) {{
+        return;
+    }}
+    let x = inputs[id.x];
+{calls}}}
+",
+        TWINS.len()
+    );
+    let inputs = inputs();
+    const COUNT: usize = TWINS.len();
+    let outputs: Vec<[f32; COUNT]> =
+        harness::run_compute(&gpu, harness::compose(&SOURCES, &entry), &inputs, 64);
+    for (i, twin) in TWINS.iter().enumerate() {
+        let mut spread = (f64::INFINITY, f64::NEG_INFINITY);
+        for (input, output) in inputs.iter().zip(&outputs) {
+            let expected = (twin.rust)(&input.map(f64::from));
+            let error = (f64::from(output[i]) - expected).abs();
+            assert!(error <= 2e-3, "{}: {} instead of {expected} for {input:?}", twin.wgsl, output[i]);
+            spread = (spread.0.min(expected), spread.1.max(expected));
+        }
+        assert!(spread.1 - spread.0 > 1e-2, "{}: all {spread:?} says nothing", twin.wgsl);
+    }
+}
