@@ -1,16 +1,32 @@
 #!/usr/bin/env bash
-# Renders the pictures of the README anew, into docs/pictures.
+# Renders the pictures of README.md and GALLERY.md anew, into docs/pictures. Arguments: names of scenarios [all].
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
 cargo build --release --bin weathering
 folder="$(mktemp -d)"
 trap 'rm -rf "${folder}"' EXIT
-# picture NAME SCENARIO SIZE FRAME: one frame a second of weather.
-picture() {
-    "${CARGO_TARGET_DIR}/release/weathering" replay "assets/scenarios/$2.ron" --fps 1 --size "$3" --out "${folder}/$1"
-    cp "${folder}/$1/frame_$4.png" "docs/pictures/$1.png"
-}
 mkdir -p docs/pictures
-picture hose hose 1024x576 00006
-picture vase vase 576x576 00005
+
+# picture SCENARIO SIZE (FRAME AS)...: one frame a second of weather; of these, the ones wanted, under their names.
+picture() {
+    local scenario="$1" size="$2"
+    shift 2
+    if [ -n "${wanted}" ] && [[ " ${wanted} " != *" ${scenario} "* ]]; then
+        return
+    fi
+    "${CARGO_TARGET_DIR}/release/weathering" replay "assets/scenarios/${scenario}.ron" --fps 1 --size "${size}" \
+        --out "${folder}/${scenario}"
+    while [ "$#" -gt 0 ]; do
+        cp "${folder}/${scenario}/frame_$1.png" "docs/pictures/$2.png"
+        shift 2
+    done
+}
+
+wanted="$*"
+picture hose 1024x576 00006 hose
+picture vase 576x576 00005 vase
+for scenario in bricks flowerpot stone_on_sand porosity_row models cloth; do
+    picture "${scenario}" 640x360 00000 "${scenario}_dry" 00004 "${scenario}_wet"
+done
+picture regions 1024x576 00005 regions

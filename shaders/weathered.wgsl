@@ -97,7 +97,14 @@ fn fragment(in: VertexOutput, @builtin(front_facing) is_front: bool) -> Fragment
 #ifdef VISIBILITY_RANGE_DITHER
     visibility_range_dither(in.position, in.visibility_range_dither);
 #endif
-    var pbr = pbr_input_from_standard_material(in, is_front);
+    var plain = in;
+#ifdef WEATHERED_STANDING
+#ifdef VERTEX_COLORS
+    // They say where water stands, not what is seen.
+    plain.color = vec4(1.0, 1.0, 1.0, in.color.a);
+#endif
+#endif
+    var pbr = pbr_input_from_standard_material(plain, is_front);
     pbr.material.base_color = alpha_discard(pbr.material, pbr.material.base_color);
     apply_decals(&pbr);
 #ifdef WEATHERED_PAINT

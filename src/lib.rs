@@ -1,10 +1,12 @@
 #![doc = include_str!("../README.md")]
 
+pub mod bake;
 pub mod clock;
 pub mod collision;
 pub mod effect;
 pub mod emitter;
 pub mod material;
+pub mod output;
 pub mod overlay;
 pub mod particle;
 pub mod replay;
@@ -22,7 +24,7 @@ pub mod prelude {
     pub use crate::collision::{ReportImpacts, SurfaceImpact};
     pub use crate::effect::WeatherEffect;
     pub use crate::emitter::{Emitter, EmitterShape};
-    pub use crate::material::PorousMaterial;
+    pub use crate::material::{PorousMaterial, StandingWater, WettingModel};
     pub use crate::overlay::{Weatherable, Wrap};
     pub use crate::particle::Forces;
     pub use crate::schedule::{WeatheringSystems, WeatheringTick};

@@ -12,11 +12,15 @@ mod gpu {
     pub mod app;
     /// Ticks and frames.
     mod frames;
+    /// No light out of nothing.
+    mod furnace;
     mod harness;
     /// The porous BRDF post-process.
     mod hnat;
     /// What must look the same, and what must not.
     mod images;
+    /// Lights, cameras, meshes.
+    mod places;
     /// Painting.
     mod splat;
     /// Every other function of the shaders.

@@ -35,7 +35,7 @@ impl Default for StandingWater {
 
 /// A law that says where water stands. Height is the green channel of
 /// [`WettingTextures::surface`](super::WettingTextures::surface), paint that of the vertex colours; both are 1 where
-/// they are missing.
+/// they are missing. On a surface with a flood, vertex colours are not seen as colours.
 #[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Default)]
 pub enum Flood {
     /// Nowhere.

@@ -1,28 +1,18 @@
-//! Files that are there whole or not at all.
+//! The folder that a replay writes into.
 
 use std::fs;
-use std::io::Write;
 use std::path::Path;
-
-use tempfile::NamedTempFile;
 
 use super::ReplayError;
 use super::maps::MAP_NAMES;
+use crate::output::{self, temporary_beside};
 
 /// Writes under a temporary name beside `path` and renames; makes missing folders. On an error nothing is left.
 ///
 /// # Errors
 /// [`ReplayError::Write`] with the path.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), ReplayError> {
-    let failed = |source| ReplayError::Write { path: path.into(), source };
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(failed)?;
-    }
-    // Removes itself unless it is persisted.
-    let mut file = temporary_beside(path).map_err(failed)?;
-    file.write_all(bytes).map_err(failed)?;
-    file.as_file().sync_data().map_err(failed)?;
-    file.persist(path).map(drop).map_err(|error| failed(error.error))
+    output::write_atomic(path, bytes).map_err(|source| ReplayError::Write { path: path.into(), source })
 }
 
 /// Makes the folder and checks that files can be written into it: better before a long run than after it.
@@ -56,19 +46,6 @@ pub(super) fn remove_earlier_run(folder: &Path) -> Result<(), ReplayError> {
         }
     }
     Ok(())
-}
-
-fn temporary_beside(path: &Path) -> std::io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".").suffix(".tmp");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // What a plain file gets, less the umask, and not the owner alone.
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
-    builder
-        .tempfile_in(path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")))
 }
 
 #[cfg(test)]

@@ -4,9 +4,11 @@ use bevy::asset::RenderAssetUsages;
 use bevy::image::{CompressedImageFormats, ImageSampler, ImageType};
 use bevy::math::Affine2;
 use bevy::prelude::*;
+use bevy::render::render_resource::Face;
 
-use super::{LoadedScenario, MaterialSpec, MeshSpec, ScenarioError, TextureSpec};
+use super::{LoadedScenario, MaterialSpec, MeshSpec, ScenarioError, SurfaceTextureSpec, TextureSpec};
 use crate::effect::WeatherEffect;
+use crate::material::WettingTextures;
 use crate::scenes::environment::{
     EnvironmentMaps, EnvironmentSettings, environment_maps_from_equirect, load_equirect,
 };
@@ -32,6 +34,8 @@ pub(super) struct MaterialMaps {
     pub(super) albedo: Option<Image>,
     pub(super) normal: Option<Image>,
     pub(super) roughness: Option<Image>,
+    pub(super) surface: Option<Image>,
+    pub(super) wet_color: Option<Image>,
 }
 
 impl LoadedScenario {
@@ -61,7 +65,7 @@ impl LoadedScenario {
                     .materials
                     .iter()
                     .map(|(name, material)| {
-                        let field = format!("materials.{name}.texture");
+                        let field = format!("materials.{name}");
                         let maps = threads.spawn({
                             let field = field.clone();
                             move || self.material_maps(&field, material)
@@ -91,35 +95,49 @@ impl LoadedScenario {
     }
 
     fn material_maps(&self, field: &str, material: &MaterialSpec) -> Result<MaterialMaps, ScenarioError> {
+        let mut maps = MaterialMaps::default();
         match &material.texture {
-            TextureSpec::Plain => Ok(MaterialMaps::default()),
+            TextureSpec::Plain => {}
             TextureSpec::Photo(photo) => {
-                let path = self.resolve(field, photo)?;
-                let bytes = std::fs::read(&path).map_err(|e| self.content_error(field, photo, e))?;
-                let image = Image::from_buffer(
-                    &bytes,
-                    ImageType::Extension("png"),
-                    CompressedImageFormats::NONE,
-                    true,
-                    ImageSampler::Default,
-                    RenderAssetUsages::default(),
-                );
-                let image = image.map_err(|e| self.content_error(field, photo, e))?;
-                let mut image =
-                    with_mips(image, MipContent::Values).map_err(|e| self.content_error(field, photo, e))?;
-                image.sampler = tiling_sampler();
-                image.asset_usage = RenderAssetUsages::RENDER_WORLD;
-                Ok(MaterialMaps { albedo: Some(image), ..default() })
+                maps.albedo = Some(self.photo(&format!("{field}.texture"), photo, true)?);
             }
             &TextureSpec::Stone { kind, size, seed } => {
-                let maps = stone_maps(kind, size, seed);
-                Ok(MaterialMaps {
-                    albedo: Some(maps.albedo),
-                    normal: Some(maps.normal),
-                    roughness: Some(maps.roughness),
-                })
+                let stone = stone_maps(kind, size, seed);
+                if material.surface == SurfaceTextureSpec::Relief {
+                    maps.surface = Some(stone.surface_map());
+                }
+                maps.albedo = Some(stone.albedo);
+                maps.normal = Some(stone.normal);
+                maps.roughness = Some(stone.roughness);
             }
         }
+        if let SurfaceTextureSpec::File(file) = &material.surface {
+            maps.surface = Some(self.photo(&format!("{field}.surface"), file, false)?);
+        }
+        if let Some(file) = &material.wet_color {
+            maps.wet_color = Some(self.photo(&format!("{field}.wet_color"), file, true)?);
+        }
+        Ok(maps)
+    }
+
+    /// A tiling texture from a `.png`.
+    fn photo(&self, field: &str, file: &str, is_srgb: bool) -> Result<Image, ScenarioError> {
+        let path = self.resolve(field, file)?;
+        let bytes = std::fs::read(&path).map_err(|e| self.content_error(field, file, e))?;
+        let image = Image::from_buffer(
+            &bytes,
+            ImageType::Extension("png"),
+            CompressedImageFormats::NONE,
+            is_srgb,
+            ImageSampler::Default,
+            RenderAssetUsages::default(),
+        );
+        let image = image.map_err(|e| self.content_error(field, file, e))?;
+        let mut image =
+            with_mips(image, MipContent::Values).map_err(|e| self.content_error(field, file, e))?;
+        image.sampler = tiling_sampler();
+        image.asset_usage = RenderAssetUsages::RENDER_WORLD;
+        Ok(image)
     }
 }
 
@@ -128,18 +146,27 @@ fn generate(mesh: &MeshSpec) -> Option<Result<Mesh, MeshError>> {
         MeshSpec::Ground { size, cells } => Some(meshes::ground(size, cells)),
         MeshSpec::Sphere { radius, sectors, stacks } => Some(meshes::uv_sphere(radius, sectors, stacks)),
         MeshSpec::Vase { height, segments, rings } => Some(meshes::vase(height, segments, rings)),
+        MeshSpec::Flowerpot { height, segments, rings } => Some(meshes::flowerpot(height, segments, rings)),
+        MeshSpec::Rock { radius, sectors, stacks, seed } => Some(meshes::rock(radius, sectors, stacks, seed)),
+        MeshSpec::Road { size, cells, seed } => Some(meshes::road(size, cells, seed)),
+        MeshSpec::Cloth { size, cells } => Some(meshes::cloth(size, cells)),
         MeshSpec::File(_) => None,
     }
 }
 
 impl MaterialMaps {
-    /// The material with its maps.
-    pub(super) fn into_material(self, spec: &MaterialSpec, images: &mut Assets<Image>) -> StandardMaterial {
+    /// The material with its maps, and what tells how it gets wet from place to place.
+    pub(super) fn into_material(
+        self,
+        spec: &MaterialSpec,
+        images: &mut Assets<Image>,
+    ) -> (StandardMaterial, WettingTextures) {
         let mut add = |image: Option<Image>| image.map(|image| images.add(image));
+        let textures = WettingTextures { surface: add(self.surface), wet_color: add(self.wet_color) };
         // Its red channel is the ambient occlusion.
         let roughness = add(self.roughness);
         let [red, green, blue] = spec.color;
-        StandardMaterial {
+        let material = StandardMaterial {
             base_color: Color::linear_rgb(red, green, blue),
             base_color_texture: add(self.albedo),
             normal_map_texture: add(self.normal),
@@ -149,7 +176,11 @@ impl MaterialMaps {
             reflectance: spec.reflectance,
             metallic: spec.metallic,
             uv_transform: Affine2::from_scale(spec.tiles),
+            diffuse_transmission: spec.translucency,
+            double_sided: spec.double_sided,
+            cull_mode: (!spec.double_sided).then_some(Face::Back),
             ..default()
-        }
+        };
+        (material, textures)
     }
 }

@@ -174,6 +174,14 @@ pub struct MaterialSpec {
     pub reflectance: f32,
     /// Metal: takes up no water.
     pub metallic: f32,
+    /// Part of the diffuse light that comes out at the back, dry.
+    pub translucency: f32,
+    /// Seen from both sides.
+    pub double_sided: bool,
+    /// How porous and how high the texture is from place to place.
+    pub surface: SurfaceTextureSpec,
+    /// Colour when wet of `model: Authored`, `.png`.
+    pub wet_color: Option<String>,
     /// How it gets wet.
     pub porous: PorousMaterial,
     /// Water that stands on it.
@@ -189,6 +197,10 @@ impl Default for MaterialSpec {
             roughness: 0.9,
             reflectance: 0.5,
             metallic: 0.0,
+            translucency: 0.0,
+            double_sided: false,
+            surface: SurfaceTextureSpec::Even,
+            wet_color: None,
             porous: PorousMaterial::default(),
             water: StandingWater::default(),
         }
@@ -212,6 +224,18 @@ pub enum TextureSpec {
         /// Another piece of the same stone.
         seed: u32,
     },
+}
+
+/// Where porosity (red) and height (green) of a material come from.
+#[derive(Serialize, Deserialize, Debug, Clone, PartialEq, Default)]
+pub enum SurfaceTextureSpec {
+    /// The same everywhere: as porous as can be, and on top.
+    #[default]
+    Even,
+    /// The relief of the generated stone, whose hollows are more porous.
+    Relief,
+    /// A `.png`.
+    File(String),
 }
 
 /// A mesh that can get wet.
@@ -269,6 +293,42 @@ pub enum MeshSpec {
         segments: u32,
         /// Along the profile.
         rings: u32,
+    },
+    /// A flowerpot: 2 · segments · rings triangles.
+    Flowerpot {
+        /// Metres.
+        height: f32,
+        /// Around, at least 3.
+        segments: u32,
+        /// Along the profile, at least 40.
+        rings: u32,
+    },
+    /// A dented sphere that lies on the ground when 0.45 radii above it.
+    Rock {
+        /// Metres.
+        radius: f32,
+        /// At least 3.
+        sectors: u32,
+        /// At least 2.
+        stacks: u32,
+        /// Another one, another rock.
+        seed: u32,
+    },
+    /// A horizontal grid like `Ground` that knows in its vertex colours where puddles form.
+    Road {
+        /// Along x and z.
+        size: Vec2,
+        /// Along x and z.
+        cells: UVec2,
+        /// Another one, other basins.
+        seed: u32,
+    },
+    /// A cloth that hangs above its origin in folds and faces +z: 2 · cells.x · cells.y triangles.
+    Cloth {
+        /// Along x and y.
+        size: Vec2,
+        /// Along x and y.
+        cells: UVec2,
     },
     /// The first mesh of a `.glb` or `.gltf`.
     File(String),

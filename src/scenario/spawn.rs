@@ -120,9 +120,9 @@ fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, loo
     let mut materials = Vec::new();
     if looks {
         for ((name, spec), maps) in scenario.materials.iter().zip(content.materials) {
-            let material = maps.into_material(spec, &mut world.resource_mut::<Assets<Image>>());
+            let (material, textures) = maps.into_material(spec, &mut world.resource_mut::<Assets<Image>>());
             let handle = world.resource_mut::<Assets<StandardMaterial>>().add(material);
-            materials.push((name, handle));
+            materials.push((name, handle, textures));
         }
     }
     for (index, (spec, mesh)) in scenario.surfaces.iter().zip(content.meshes).enumerate() {
@@ -152,8 +152,8 @@ fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, loo
         if let Some(material) = scenario.materials.get(&spec.material) {
             entity.insert((material.porous, material.water));
         }
-        if let Some((_, material)) = materials.iter().find(|(name, _)| **name == spec.material) {
-            entity.insert(MeshMaterial3d(material.clone()));
+        if let Some((_, material, textures)) = materials.iter().find(|(name, ..)| **name == spec.material) {
+            entity.insert((MeshMaterial3d(material.clone()), textures.clone()));
         }
     }
     if looks {

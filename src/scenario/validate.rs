@@ -6,7 +6,8 @@ use std::fmt::Display;
 use bevy::math::{Vec2, Vec3};
 
 use super::{
-    EmitterSpec, LoadedScenario, MaterialSpec, MeshSpec, Scenario, ScenarioError, SurfaceSpec, TextureSpec,
+    EmitterSpec, LoadedScenario, MaterialSpec, MeshSpec, Scenario, ScenarioError, SurfaceSpec,
+    SurfaceTextureSpec, TextureSpec,
 };
 use crate::clock::WeatheringClock;
 use crate::emitter::EmitterShape;
@@ -80,6 +81,7 @@ impl LoadedScenario {
             ("roughness", material.roughness),
             ("reflectance", material.reflectance),
             ("metallic", material.metallic),
+            ("translucency", material.translucency),
         ] {
             self.not_negative(&format!("{field}.{name}"), value, 1.0)?;
         }
@@ -94,6 +96,17 @@ impl LoadedScenario {
         }
         self.positive(&format!("{field}.tiles.x"), material.tiles.x, 1.0e4)?;
         self.positive(&format!("{field}.tiles.y"), material.tiles.y, 1.0e4)?;
+        if let SurfaceTextureSpec::File(path) = &material.surface {
+            self.resolve(&format!("{field}.surface"), path)?;
+        }
+        if material.surface == SurfaceTextureSpec::Relief
+            && !matches!(material.texture, TextureSpec::Stone { .. })
+        {
+            return Err(self.value(format!("{field}.surface"), "Relief", "of a `texture` that is `Stone`"));
+        }
+        if let Some(path) = &material.wet_color {
+            self.resolve(&format!("{field}.wet_color"), path)?;
+        }
         match &material.texture {
             TextureSpec::Plain => {}
             TextureSpec::Photo(path) => {
@@ -130,16 +143,18 @@ impl LoadedScenario {
             return Err(self.value(format!("{field}.maps.map_size"), size, expected));
         }
         let triangles = match &surface.mesh {
-            MeshSpec::Ground { size, cells } => {
+            MeshSpec::Ground { size, cells }
+            | MeshSpec::Road { size, cells, .. }
+            | MeshSpec::Cloth { size, cells } => {
                 self.positive(&format!("{field}.mesh.size.x"), size.x, FAR)?;
                 self.positive(&format!("{field}.mesh.size.y"), size.y, FAR)?;
                 u64::from(cells.x) * u64::from(cells.y) * 2
             }
-            MeshSpec::Sphere { radius, sectors, stacks } => {
+            MeshSpec::Sphere { radius, sectors, stacks } | MeshSpec::Rock { radius, sectors, stacks, .. } => {
                 self.positive(&format!("{field}.mesh.radius"), *radius, FAR)?;
                 u64::from(*sectors) * u64::from(*stacks) * 2
             }
-            MeshSpec::Vase { height, segments, rings } => {
+            MeshSpec::Vase { height, segments, rings } | MeshSpec::Flowerpot { height, segments, rings } => {
                 self.positive(&format!("{field}.mesh.height"), *height, FAR)?;
                 u64::from(*segments) * u64::from(*rings) * 2
             }

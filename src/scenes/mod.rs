@@ -6,7 +6,7 @@
 //!
 //! | module | makes |
 //! |---|---|
-//! | [`meshes`] | a ground grid, a UV sphere and a vase, with normals, tangents and a UV layout to wet |
+//! | [`meshes`] | ground, road, cloth, sphere, rock, vase and flowerpot, with a UV layout to wet |
 //! | [`environment`] | a skybox and image-based light from an equirectangular photograph |
 //! | [`stone`] | tileable terracotta, sandstone, concrete and brickwork |
 //! | [`mips`] | mip maps, which Bevy does not make, for these and for loaded photographs |

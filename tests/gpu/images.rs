@@ -67,20 +67,9 @@ fn draw(surface: Option<PorousMaterial>, metallic: f32, water_mm3_per_texel: f32
         })
     });
     if water_mm3_per_texel > 0.0 {
-        // One stamp as large as the map, four times, spreads nearly evenly.
         for &entity in &surfaces {
             let mut queue = app.world_mut().get_mut::<SplatQueue>(entity).unwrap();
-            for center in [[0, 0], [8192, 0], [0, 8192], [8192, 8192]] {
-                let water_nl = (water_mm3_per_texel * 1000.0 * 64.0 * 64.0) as u32;
-                let splat = Splat {
-                    center,
-                    radius: [63 * 128; 2],
-                    water_nl,
-                    tick: 1,
-                    ..bytemuck::Zeroable::zeroed()
-                };
-                queue.push(splat);
-            }
+            even_water(water_mm3_per_texel).into_iter().for_each(|splat| queue.push(splat));
         }
         update_until(&mut app, "the water", |world| world.resource::<SplatStats>().splats() >= 8);
     }
@@ -93,11 +82,22 @@ fn draw(surface: Option<PorousMaterial>, metallic: f32, water_mm3_per_texel: f32
     Some(picture(&mut app, &target))
 }
 
+/// Water on all of a map of 64 texels a side: one stamp as large as the map, four times, spreads nearly evenly.
+pub fn even_water(mm3_per_texel_and_stamp: f32) -> [Splat; 4] {
+    [[0, 0], [8192, 0], [0, 8192], [8192, 8192]].map(|center| Splat {
+        center,
+        radius: [63 * 128; 2],
+        water_nl: (mm3_per_texel_and_stamp * 1000.0 * 64.0 * 64.0) as u32,
+        tick: 1,
+        ..bytemuck::Zeroable::zeroed()
+    })
+}
+
 /// Water, in mm³ per texel, that the ball and the floor can just take up.
 const NO_FILM: f32 = 2.0;
 
 /// Mean and largest difference of two pictures, in 1/255.
-fn difference(a: &RgbImage, b: &RgbImage) -> (f64, u8) {
+pub fn difference(a: &RgbImage, b: &RgbImage) -> (f64, u8) {
     assert_eq!(a.dimensions(), b.dimensions());
     let differences = a.as_raw().iter().zip(b.as_raw()).map(|(a, b)| a.abs_diff(*b));
     let sum: f64 = differences.clone().map(f64::from).sum();
@@ -109,7 +109,7 @@ fn mean(picture: &RgbImage) -> f64 {
 }
 
 /// Keeps the pictures of a failed comparison where a person can look at them.
-fn keep(name: &str, pictures: &[(&str, &RgbImage)]) {
+pub fn keep(name: &str, pictures: &[(&str, &RgbImage)]) {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/images/actual");
     std::fs::create_dir_all(&folder).unwrap();
     for (which, picture) in pictures {
@@ -117,7 +117,7 @@ fn keep(name: &str, pictures: &[(&str, &RgbImage)]) {
     }
 }
 
-fn assert_same(name: &str, ours: &RgbImage, standard: &RgbImage) {
+pub fn assert_same(name: &str, ours: &RgbImage, standard: &RgbImage) {
     let (average, largest) = difference(ours, standard);
     if average > 0.05 || largest > 2 {
         keep(name, &[("ours", ours), ("standard", standard)]);

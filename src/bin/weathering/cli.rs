@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use bevy::math::UVec2;
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 
 /// Rain, hoses and dust on real meshes: replay scenarios, or play with them.
 #[derive(Parser, Debug)]
@@ -19,6 +19,8 @@ pub enum Command {
     Replay(ReplayArgs),
     /// Open a scenario in a window
     Sandbox(SandboxArgs),
+    /// Make a wet version of a base colour texture
+    WetTexture(WetTextureArgs),
 }
 
 #[derive(Args, Debug)]
@@ -56,6 +58,38 @@ pub struct SandboxArgs {
     /// Folder for screenshots
     #[arg(long, default_value = "out")]
     pub out: PathBuf,
+}
+
+/// Without `--model`, the spectral experiment.
+#[derive(Args, Debug)]
+pub struct WetTextureArgs {
+    /// The dry texture, .png
+    pub file: PathBuf,
+    /// Where to [default: beside it, with `_wet` behind its name]
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Taken from every bin of the spectrum, 0 to 1
+    #[arg(long, default_value_t = 0.05, conflicts_with = "model")]
+    pub shift: f64,
+    /// Part of the way of the spectrum towards water, 0 to 1
+    #[arg(long, default_value_t = 0.025, conflicts_with = "model")]
+    pub lerp: f64,
+    /// A model in place of the spectrum
+    #[arg(long, value_enum)]
+    pub model: Option<TextureModel>,
+    /// How porous it is, 0 to 1
+    #[arg(long, default_value_t = 1.0, requires = "model")]
+    pub porosity: f64,
+}
+
+#[derive(ValueEnum, Debug, Clone, Copy)]
+pub enum TextureModel {
+    /// Lekner and Dorf: a film over rough matter
+    Ld,
+    /// Twomey, Bohren, Mergenthaler: water between grains
+    Tbm,
+    /// Lagarde: the more porous, the darker
+    Lagarde,
 }
 
 fn parse_size(text: &str) -> Result<UVec2, String> {

@@ -3,6 +3,7 @@
 mod cli;
 mod replay;
 mod sandbox;
+mod wet_texture;
 
 use std::process::ExitCode;
 
@@ -12,6 +13,7 @@ fn main() -> ExitCode {
     let result = match cli::Cli::parse().command {
         cli::Command::Replay(arguments) => replay::run(&arguments),
         cli::Command::Sandbox(arguments) => sandbox::run(&arguments),
+        cli::Command::WetTexture(arguments) => wet_texture::run(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,4 +1,6 @@
 //! The recipes: what is seen on a patch of each stone, coarse to fine.
+//!
+//! Brickwork has a file of its own, as have sand, asphalt and linen together.
 
 use bevy::math::{Vec2, Vec3};
 
@@ -157,6 +159,7 @@ pub(super) fn concrete(layers: Layers) -> impl Fn(Vec2) -> Texel {
 #[cfg(test)]
 mod tests {
     use super::super::brick::{TILE_MM, brick};
+    use super::super::grounds::{asphalt, linen, sand};
     use super::*;
 
     #[test]
@@ -177,5 +180,8 @@ mod tests {
         check("sandstone", sandstone(layers));
         check("concrete", concrete(layers));
         check("brick", brick(Layers { tile_mm: TILE_MM, ..layers }));
+        check("sand", sand(layers));
+        check("asphalt", asphalt(Layers { tile_mm: 600.0, ..layers }));
+        check("linen", linen(Layers { tile_mm: 100.0, ..layers }));
     }
 }

@@ -1,14 +1,17 @@
-//! Tileable close-ups of stone: terracotta, sandstone, concrete and brickwork, grown from noise.
+//! Tileable close-ups of stone, of ground and of cloth, grown from noise: terracotta, sandstone, concrete,
+//! brickwork, beach sand, asphalt and linen.
 //!
 //! One tile is a patch [`Stone::tile_mm`] wide. For every texel a recipe adds up what is seen on such a patch,
 //! coarse to fine, as colour and as height in millimetres: bedding, mottling, turning marks, pits, and at
-//! the end single grains with a colour and a dome each. Hollows, where the height lies below its own blur,
-//! are darkened by the light they lose. The normal map is the slope of that same height, so relief, colour
-//! and occlusion belong together. At last the colours are scaled to the mean albedo of [`Stone::albedo`].
+//! the end single grains with a colour and a dome each, or threads that go over and under. Hollows, where
+//! the height lies below its own blur, are darkened by the light they lose. The normal map is the slope of
+//! that same height, so relief, colour and occlusion belong together. At last the colours are scaled to the mean albedo of [`Stone::albedo`].
+//! How water acts from place to place follows from the height as well, see [`StoneMaps::surface_map`].
 //!
-//! Tiling. Bricks are numbered, grains, pits and spots live in numbered cells, and the numbers wrap, so they
-//! repeat exactly. The noise does not repeat by itself: over the last quarter of the tile, along either axis, it is exchanged smoothly for
-//! the noise from before the tile's first edge. Uncorrelated noises lose contrast when averaged; the sum is
+//! Tiling. Bricks and threads are numbered, grains, pits and spots live in numbered cells, and the numbers
+//! wrap, so they repeat exactly, as do ripples, of which a tile holds a whole number. The noise does not
+//! repeat by itself: over the last quarter of the tile, along either axis, it is exchanged smoothly for the
+//! noise from before the tile's first edge. Uncorrelated noises lose contrast when averaged; the sum is
 //! divided by the root of its squared weights, which gives it back (Heitz and Neyret, "High-performance
 //! by-example noise using a histogram-preserving blending operator", 2018).
 //!
@@ -16,6 +19,7 @@
 //! hide repetition, a wall of many tiles shows its pattern as a photograph would.
 
 mod brick;
+mod grounds;
 mod kinds;
 mod noise;
 mod relief;
@@ -28,11 +32,12 @@ use serde::{Deserialize, Serialize};
 
 use super::mips::{MipContent, mip_chain, srgb_from_linear, tiling_sampler, unorm8};
 use brick::brick;
+use grounds::{asphalt, linen, sand};
 use kinds::{Texel, concrete, sandstone, terracotta};
 use noise::Layers;
-use relief::{normals, occlusion};
+use relief::{normals, occlusion, span_mm};
 
-/// A kind of stone.
+/// A kind of stone, or of ground or cloth.
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stone {
     /// Fired clay from the wheel: fine, mottled, turning marks along u, specks of temper, a few scratches.
@@ -44,11 +49,27 @@ pub enum Stone {
     /// Moulded bricks, 215 by 65 mm, in running bond with recessed joints of sandy mortar: a wall with its
     /// courses along u, or paving.
     Brick,
+    /// Dry beach sand, grain by grain, quartz and ochre with a few dark grains and bits of shell; soft wind
+    /// ripples, 57 mm from one to the next and 3 mm high, with their crests along u.
+    Sand,
+    /// A road: stones of 3 to 11 mm packed in bitumen, their tops worn bare, with a few hairline cracks.
+    Asphalt,
+    /// Off-white linen in plain weave, a thread a millimetre, uneven as it was spun; one way along u, the
+    /// other along v.
+    Linen,
 }
 
 impl Stone {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Terracotta, Self::Sandstone, Self::Concrete, Self::Brick];
+    pub const ALL: [Self; 7] = [
+        Self::Terracotta,
+        Self::Sandstone,
+        Self::Concrete,
+        Self::Brick,
+        Self::Sand,
+        Self::Asphalt,
+        Self::Linen,
+    ];
 
     /// Mean diffuse albedo of the dry stone, linear RGB, `0..=1`. For brickwork that includes the mortar; the
     /// faces of the bricks alone come to (0.42, 0.20, 0.13).
@@ -58,14 +79,19 @@ impl Stone {
             Self::Sandstone => Vec3::new(0.45, 0.36, 0.25),
             Self::Concrete => Vec3::new(0.40, 0.38, 0.35),
             Self::Brick => Vec3::new(0.415, 0.225, 0.155),
+            Self::Sand => Vec3::new(0.48, 0.39, 0.27),
+            Self::Asphalt => Vec3::new(0.12, 0.12, 0.12),
+            Self::Linen => Vec3::new(0.62, 0.58, 0.50),
         }
     }
 
     /// Edge of a tile in millimetres; the relief has natural slopes at that scale.
     pub fn tile_mm(self) -> f32 {
         match self {
-            Self::Terracotta | Self::Sandstone | Self::Concrete => 400.0,
+            Self::Terracotta | Self::Sandstone | Self::Concrete | Self::Sand => 400.0,
             Self::Brick => brick::TILE_MM,
+            Self::Asphalt => 600.0,
+            Self::Linen => 100.0,
         }
     }
 }
@@ -87,13 +113,36 @@ impl StoneMaps {
     pub fn height_mm(&self) -> &[f32] {
         &self.height
     }
+
+    /// How water acts from place to place, for [`WettingTextures`](crate::material::WettingTextures):
+    /// `Rgba8Unorm` with mip maps and a repeating sampler, linear.
+    ///
+    /// Green is the height, from 0 at the hundredth of the texels that lie lowest to 1 at the hundredth that
+    /// lie highest, over [`StoneMaps::relief_mm`]. Red is the porosity, `0.3..=1`: recesses, where dust and
+    /// loose grains gather, soak up more than tops, which are worn or burnt dense. Blue is 0, alpha 1.
+    pub fn surface_map(&self) -> Image {
+        let (low, high) = span_mm(&self.height);
+        let span = (high - low).max(f32::MIN_POSITIVE);
+        let texels = self.height.iter().flat_map(|height| {
+            let height = ((height - low) / span).clamp(0.0, 1.0);
+            [unorm8(1.0 - 0.7 * height), unorm8(height), 0, 255]
+        });
+        let size = self.height.len().isqrt() as u32;
+        texture(texels.collect(), size, TextureFormat::Rgba8Unorm, MipContent::Values)
+    }
+
+    /// What the height in [`StoneMaps::surface_map`] spans from 0 to 1, in millimetres.
+    pub fn relief_mm(&self) -> f32 {
+        let (low, high) = span_mm(&self.height);
+        high - low
+    }
 }
 
 /// Grows a stone.
 ///
 /// `size` is the edge of the maps in texels, held within 16 and 4096. Below 1024 the finest grains are
-/// drawn larger instead of being lost. The result depends on the arguments alone; 1024 takes one to
-/// two seconds on one core.
+/// drawn larger instead of being lost, below 400 threads too. The result depends on the arguments alone;
+/// 1024 takes one to two seconds on one core.
 pub fn stone_maps(stone: Stone, size: u32, seed: u32) -> StoneMaps {
     let size = size.clamp(16, 4096);
     let layers = Layers { seed, finest: size as f32 / 3.0, tile_mm: stone.tile_mm() };
@@ -102,6 +151,9 @@ pub fn stone_maps(stone: Stone, size: u32, seed: u32) -> StoneMaps {
         Stone::Sandstone => every_texel(size, sandstone(layers)),
         Stone::Concrete => every_texel(size, concrete(layers)),
         Stone::Brick => every_texel(size, brick(layers)),
+        Stone::Sand => every_texel(size, sand(layers)),
+        Stone::Asphalt => every_texel(size, asphalt(layers)),
+        Stone::Linen => every_texel(size, linen(layers)),
     };
     let width = size as usize;
     let mut height: Vec<f32> = texels.iter().map(|texel| texel.height_mm).collect();
@@ -257,7 +309,8 @@ mod tests {
     #[test]
     fn images_are_ready_to_use() {
         for (stone, maps) in every_stone() {
-            for image in [&maps.albedo, &maps.normal, &maps.roughness] {
+            let surface = maps.surface_map();
+            for image in [&maps.albedo, &maps.normal, &maps.roughness, &surface] {
                 assert_eq!(image.texture_descriptor.mip_level_count, 9, "{stone:?}");
                 let bytes = image.data.as_ref().expect("texels").len();
                 assert_eq!(bytes, (0..9).map(|level| (SIZE >> level).pow(2) * 4).sum::<usize>());
@@ -277,10 +330,54 @@ mod tests {
     }
 
     #[test]
+    fn surface_maps_hold_the_relief_and_what_it_does_to_porosity() {
+        for (stone, maps) in every_stone() {
+            let (image, relief) = (maps.surface_map(), maps.relief_mm());
+            assert_eq!(image.texture_descriptor.format, TextureFormat::Rgba8Unorm, "{stone:?}");
+            let data = image.data.as_ref().expect("texels");
+            let (mut lowest, mut highest) = (0, 0);
+            // Where the height is not cut off: what 0 stands for.
+            let (mut least, mut most) = (f32::MAX, f32::MIN);
+            for (texel, &height) in data.chunks_exact(4).zip(maps.height_mm()) {
+                let (porosity, level) = (f32::from(texel[0]), f32::from(texel[1]));
+                assert!((porosity - (255.0 - 0.7 * level)).abs() <= 1.0, "{stone:?}: {texel:?}");
+                assert_eq!(texel[2..], [0, 255], "{stone:?}");
+                match texel[1] {
+                    0 => lowest += 1,
+                    255 => highest += 1,
+                    _ => {
+                        let base = height - relief * level / 255.0;
+                        (least, most) = (least.min(base), most.max(base));
+                    }
+                }
+            }
+            assert!((0.0..1.1 / 255.0).contains(&((most - least) / relief)), "{stone:?}: {least} to {most}");
+            for cut in [lowest, highest] {
+                let share = cut as f32 / (SIZE * SIZE) as f32;
+                assert!((0.009..0.1).contains(&share), "{stone:?}: {share}");
+            }
+        }
+    }
+
+    #[test]
+    fn grounds_have_the_relief_they_promise() {
+        for size in [64, SIZE as u32] {
+            for (stone, expected) in
+                [(Stone::Sand, 3.0..6.0), (Stone::Asphalt, 2.0..3.0), (Stone::Linen, 0.25..0.4)]
+            {
+                let relief = stone_maps(stone, size, 11).relief_mm();
+                assert!(expected.contains(&relief), "{stone:?} at {size}: {relief} mm");
+            }
+        }
+    }
+
+    #[test]
     fn the_seed_decides_and_nothing_else() {
-        let of = |seed| stone_maps(Stone::Sandstone, 64, seed).albedo.data;
-        assert_eq!(of(1), of(1));
-        assert_ne!(of(1), of(2));
+        for stone in Stone::ALL {
+            let of = |seed| stone_maps(stone, 64, seed).albedo.data;
+            assert_eq!(of(1), of(1), "{stone:?}");
+            assert_ne!(of(1), of(2), "{stone:?}");
+        }
         let tiny = stone_maps(Stone::Concrete, 0, 1);
         assert_eq!(tiny.albedo.width(), 16);
     }

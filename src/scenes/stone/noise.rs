@@ -90,6 +90,17 @@ pub(super) struct Grain {
 }
 
 impl Grain {
+    /// 0 where it meets the next, towards 1 in the middle of a large one.
+    pub(super) fn inside(&self) -> f32 {
+        // All points within one cell's width are known, of those beyond only some.
+        self.second.min(1.0) - self.nearest.min(1.0)
+    }
+
+    /// Height of a dome over the grain, 0 where it meets the next, at most 1.
+    pub(super) fn dome(&self) -> f32 {
+        1.0 - (1.0 - self.inside()).powi(2)
+    }
+
     /// A random number of the grain's own, `0..1`, one for each `which`.
     pub(super) fn chance(&self, which: u32) -> f32 {
         unit(hash([self.number, which, 2]))
@@ -125,9 +136,13 @@ impl Cells {
 
     /// Height of a grain in millimetres, 0 where it meets the next; `rise` is in widths of a cell.
     pub(super) fn dome_mm(&self, grain: &Grain, rise: f32) -> f32 {
-        // All points within one cell's width are known, of those beyond only some.
-        let inside = grain.second.min(1.0) - grain.nearest.min(1.0);
-        rise * self.cell_mm * (1.0 - (1.0 - inside).powi(2))
+        rise * self.cell_mm * grain.dome()
+    }
+
+    /// How far it is at least to where the grain meets the next, in millimetres: exactly so far on the line
+    /// from the one's point to the other's.
+    pub(super) fn border_mm(&self, grain: &Grain) -> f32 {
+        0.5 * self.cell_mm * grain.inside()
     }
 
     /// Round spots, 1 in the middle and 0 at the edge and outside. `share` of the cells have one, with a

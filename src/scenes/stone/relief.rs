@@ -1,4 +1,4 @@
-//! What follows from the height alone: occlusion and normals.
+//! What follows from the height alone: occlusion, normals and how much relief there is.
 
 use bevy::math::Vec3;
 
@@ -45,9 +45,30 @@ pub(super) fn normals(height: &[f32], width: usize, tile_mm: f32) -> Vec<Vec3> {
     (0..width * width).map(|i| normal((i % width, i / width))).collect()
 }
 
+/// The heights that a hundredth of the texels lie below and above: the relief without its few extremes.
+pub(super) fn span_mm(height: &[f32]) -> (f32, f32) {
+    let mut heights = height.to_vec();
+    let last = height.len() - 1;
+    let mut ranked = |rank: usize| *heights.select_nth_unstable_by(rank, f32::total_cmp).1;
+    (ranked(last / 100), ranked(last - last / 100))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_span_leaves_out_a_hundredth_at_either_end() {
+        // 0 to 1000 in a shuffled order, with a spike and a hole.
+        let mut height: Vec<f32> = (0..=1000).map(|i| (i * 400 % 1001) as f32).collect();
+        assert_eq!(span_mm(&height), (10.0, 990.0));
+        for value in &mut height {
+            if *value == 0.0 || *value == 1000.0 {
+                *value = 1e3 * (*value - 500.0);
+            }
+        }
+        assert_eq!(span_mm(&height), (10.0, 990.0));
+    }
 
     #[test]
     fn normals_lean_away_from_the_summit() {
