@@ -221,24 +221,24 @@ fn apply_wet_lighting(in: PbrInput, water: Water, normal: vec3<f32>) -> vec4<f32
     let coverage = point.water.coverage;
     let mirrored = fresnel(WATER_REFLECTANCE, point.surface.NdotV);
     let clear = clearness(point, AMBIENT_COSINE) * (1.0 - pores * mirrored);
-    input.diffuse_color *= clear * (1.0 - coverage * mirrored);
+    let spread = clear * (1.0 - coverage * mirrored);
     let highlight = clear * mix(1.0, (1.0 - mirrored) * (1.0 - mirrored), coverage);
     var indirect = vec3(0.0);
     var found_diffuse = false;
 #ifdef LIGHTMAP
-    indirect += in.lightmap_light * input.diffuse_color;
+    indirect += in.lightmap_light * input.diffuse_color * spread;
     found_diffuse = true;
 #endif
 #ifdef IRRADIANCE_VOLUME
     if !found_diffuse {
         let irradiance = irradiance_volume::irradiance_volume_light(in.world_position.xyz, in.N, &ranges);
-        indirect += irradiance * input.diffuse_color * in.diffuse_occlusion;
+        indirect += irradiance * input.diffuse_color * in.diffuse_occlusion * spread;
         found_diffuse = true;
     }
 #endif
 #ifdef ENVIRONMENT_MAP
     let environment = environment_map::environment_map_light(&input, &ranges, found_diffuse);
-    indirect += environment.diffuse * in.diffuse_occlusion;
+    indirect += environment.diffuse * (in.diffuse_occlusion * spread);
     indirect += environment.specular * (in.specular_occlusion * highlight);
     let mirror = (coverage + pores) * mirrored;
     if mirror > 0.0 {
@@ -258,8 +258,8 @@ fn apply_wet_lighting(in: PbrInput, water: Water, normal: vec3<f32>) -> vec4<f32
     enable_ambient = view_bindings::lights.ambient_light_affects_lightmapped_meshes != 0u;
 #endif
     if enable_ambient {
-        let F0 = mix(input.F0_dielectric, input.F0_metallic, input.metallic) * highlight;
-        indirect += ambient::ambient_light(in.world_position, in.N, in.V, input.layers[LAYER_BASE].NdotV,
+        let F0 = mix(input.F0_dielectric, input.F0_metallic, input.metallic);
+        indirect += spread * ambient::ambient_light(in.world_position, in.N, in.V, input.layers[LAYER_BASE].NdotV,
             input.diffuse_color, F0, in.material.perceptual_roughness, in.diffuse_occlusion);
 #ifdef STANDARD_MATERIAL_DIFFUSE_TRANSMISSION
         transmitted += ambient::ambient_light(far_position, -in.N, -in.V, 1.0, far.diffuse_color, vec3(0.0), 1.0, vec3(1.0));
