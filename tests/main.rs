@@ -23,6 +23,8 @@ mod gpu {
     mod places;
     /// Painting.
     mod splat;
+    /// Floods, ripples, light through cloth.
+    mod standing;
     /// Every other function of the shaders.
     mod twins;
 }
@@ -32,5 +34,7 @@ mod layout;
 mod replay;
 /// What the parts are together: order, independence of a renderer.
 mod schedule;
+/// The smaller tools of the program.
+mod tools;
 /// The sandbox in a real window, with real keys.
 mod window;

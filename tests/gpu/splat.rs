@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use bevy::render::gpu_readback::Readback;
 use bevy_weathering::overlay::{
-    CpuMaps, Overlays, Splat, SplatQueue, SplatStats, TexelState, Weatherable, Wrap,
+    CpuMaps, Overlays, RainRing, Splat, SplatQueue, SplatStats, TexelState, Weatherable, Wrap,
 };
 
 use super::app::{app, read_back, update, update_until};
@@ -134,6 +134,37 @@ fn a_stamp_in_the_corner_deposits_what_one_in_the_middle_does() {
         }
     }
     assert!(untouched > SIZE * SIZE * 9 / 10);
+}
+
+#[test]
+fn tiles_remember_their_last_drops_the_newest_first() {
+    let Some(mut app) = app() else { return };
+    let surface = Weatherable { map_size: SIZE, ..default() };
+    let entity = spawn_surface(&mut app, surface);
+    let drop = |tick: u32, x: i32| Splat {
+        center: [x * 256, 5 * 256],
+        radius: [512; 2],
+        water_nl: 100 * tick,
+        tick,
+        ..bytemuck::Zeroable::zeroed()
+    };
+    // Into the second tile: six drops in two batches, one without water, and one over the edge from the first tile.
+    let dust = Splat { water_nl: 0, ..drop(9, 20) };
+    for batch in
+        [vec![drop(1, 18), drop(2, 19), drop(3, 15)], vec![drop(4, 20), dust, drop(5, 21), drop(6, 22)]]
+    {
+        let before = app.world().resource::<SplatStats>().splats();
+        push(&mut app, entity, &batch);
+        painted(&mut app, before + batch.len() as u64);
+    }
+    let rings = app.world().get::<Overlays>(entity).unwrap().rings.clone();
+    let bytes = read_back(&mut app, vec![Readback::buffer(rings)]);
+    let rings: Vec<RainRing> = bytemuck::pod_collect_to_vec(&bytes[0]);
+    let ring = |tick: u32, x: i32| RainRing { center: [x * 256, 5 * 256], tick, water_nl: 100 * tick };
+    let nothing = RainRing::default();
+    assert_eq!(rings[0..4], [ring(3, 15), nothing, nothing, nothing]);
+    assert_eq!(rings[4..8], [ring(6, 22), ring(5, 21), ring(4, 20), ring(2, 19)]);
+    assert!(rings[8..].iter().all(|ring| *ring == nothing));
 }
 
 #[test]
