@@ -31,9 +31,14 @@ if ! command -v cargo >/dev/null; then
 fi
 command -v cc >/dev/null || install gcc libc6-dev
 # A Vulkan driver of any kind; Mesa's runs on the CPU.
-if ! ls /usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json >/dev/null 2>&1 && [ -z "${VK_ICD_FILENAMES:-}" ]; then
-    install mesa-vulkan-drivers
-fi
+has_driver() {
+    local manifest
+    for manifest in "${VK_ICD_FILENAMES:-}" /usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json; do
+        if [ -e "${manifest}" ]; then return 0; fi
+    done
+    return 1
+}
+has_driver || install mesa-vulkan-drivers
 # has_library NAME. The loader's list comes first into a variable: `grep -q` would leave a pipe that `pipefail` sees break.
 has_library() {
     local libraries

@@ -27,6 +27,8 @@ mod gpu {
     mod standing;
     /// Every other function of the shaders.
     mod twins;
+    /// Shaders that change.
+    mod understudy;
 }
 /// Structs that Rust and WGSL share.
 mod layout;

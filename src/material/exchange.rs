@@ -1,9 +1,11 @@
 //! Exchanging a `StandardMaterial` for its weathered form, and keeping the two in step.
 
+use bevy::core_pipeline::prepass::DeferredPrepass;
 use bevy::material::OpaqueRendererMethod;
 use bevy::prelude::*;
 
 use super::uniform::SurfaceLook;
+use super::warm_up::{ShaderChanges, Understudy, rehearse};
 use super::{
     ClockBuffer, PorousExtension, PorousMaterial, StandingWater, WeatheredMaterial, WettingTextures,
 };
@@ -72,14 +74,15 @@ fn weathered_base(dry: &StandardMaterial, extension: &PorousExtension) -> Standa
 pub(super) fn exchange_materials(
     mut commands: Commands,
     clock: Res<ClockBuffer>,
+    deferred_cameras: Query<(), With<DeferredPrepass>>,
     standard: Res<Assets<StandardMaterial>>,
     mut weathered: ResMut<Assets<WeatheredMaterial>>,
     new: Query<(Entity, Surface, &MeshMaterial3d<StandardMaterial>), With<Weatherable>>,
 ) {
     for (entity, surface, material) in &new {
         let Some(dry) = standard.get(material) else { continue };
-        if dry.opaque_render_method == OpaqueRendererMethod::Deferred {
-            info_once!("weathered surfaces are drawn forward, those whose material says deferred, too");
+        if dry.opaque_render_method != OpaqueRendererMethod::Forward && !deferred_cameras.is_empty() {
+            info_once!("weathered surfaces are drawn forward, before cameras with a deferred prepass, too");
         }
         let extension = extension(surface, &clock);
         let handle = weathered.add(WeatheredMaterial { base: weathered_base(dry, &extension), extension });
@@ -123,16 +126,28 @@ pub(super) fn follow_dry_materials(
 
 /// Copies what users edit, new maps, and the first water into the weathered material.
 pub(super) fn follow_surfaces(
+    mut commands: Commands,
     clock: Res<ClockBuffer>,
+    changes: Res<ShaderChanges>,
     standard: Res<Assets<StandardMaterial>>,
     mut weathered: ResMut<Assets<WeatheredMaterial>>,
-    changed: Query<(Surface, &DryMaterial, &MeshMaterial3d<WeatheredMaterial>), Edited>,
+    changed: Query<(Entity, Surface, &DryMaterial, &MeshMaterial3d<WeatheredMaterial>), Edited>,
+    understudies: Query<(Entity, &ChildOf), With<Understudy>>,
 ) {
-    for (surface, dry, material) in &changed {
-        let Some(mut material) = weathered.get_mut(material) else { continue };
-        material.extension = extension(surface, &clock);
+    for (entity, surface, dry, handle) in &changed {
+        let Some(mut material) = weathered.get_mut(handle) else { continue };
+        let extension = extension(surface, &clock);
         if let Some(dry) = standard.get(&dry.0) {
-            material.base = weathered_base(dry, &material.extension);
+            material.base = weathered_base(dry, &extension);
+        }
+        let old = material.extension.key;
+        let next = WeatheredMaterial { base: material.base.clone(), extension: extension.clone() };
+        material.extension = extension;
+        if next.extension.key != old && *changes == ShaderChanges::WhenCompiled {
+            material.extension.key = old;
+            drop(material);
+            let next = weathered.add(next);
+            rehearse(&mut commands, entity, next, &understudies);
         }
     }
 }

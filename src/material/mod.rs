@@ -21,6 +21,7 @@ mod porous;
 mod ranges;
 mod standing;
 mod uniform;
+mod warm_up;
 
 use bevy::asset::{AssetEventSystems, embedded_asset};
 use bevy::pbr::MaterialPlugin;
@@ -40,6 +41,7 @@ pub use porous::{
 };
 pub use ranges::OutOfRange;
 pub use standing::{Flood, StandingWater};
+pub use warm_up::Understudy;
 
 /// Draws weathered surfaces. Does nothing without a render app.
 pub struct PorousMaterialPlugin;
@@ -68,7 +70,7 @@ impl Plugin for PorousMaterialPlugin {
         load_shader_library!(app, "../../shaders/common/wet_lighting.wgsl");
         embedded_asset!(app, "../../shaders/weathered.wgsl");
         app.add_plugins(MaterialPlugin::<WeatheredMaterial>::default())
-            .add_plugins(clock::plugin)
+            .add_plugins((clock::plugin, warm_up::plugin))
             .add_observer(exchange::release_surface)
             .add_systems(
                 PostUpdate,

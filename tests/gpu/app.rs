@@ -35,8 +35,21 @@ pub fn unfinished_app() -> Option<App> {
     Some(app)
 }
 
+/// The same with pipelines that are compiled in the background, as games have it.
+pub fn app_that_compiles_in_the_background() -> Option<App> {
+    let mut app = bare(false)?;
+    app.add_plugins(WeatheringPlugins).insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
+    app.finish();
+    app.cleanup();
+    Some(app)
+}
+
 /// Bevy alone.
 pub fn bare_app() -> Option<App> {
+    bare(true)
+}
+
+fn bare(synchronous_pipeline_compilation: bool) -> Option<App> {
     harness::gpu()?;
     let mut app = App::new();
     let no_window =
@@ -44,7 +57,7 @@ pub fn bare_app() -> Option<App> {
     app.add_plugins(
         DefaultPlugins
             .set(no_window)
-            .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
+            .set(RenderPlugin { synchronous_pipeline_compilation, ..default() })
             .disable::<WinitPlugin>()
             .disable::<PipelinedRenderingPlugin>()
             .disable::<LogPlugin>()
