@@ -4,7 +4,7 @@
 // the order of their impacts, and reads and writes its texel once. Edges of the map are a modulo in `kernel`.
 
 #import bevy_weathering::kernel::{
-    Axis, axis_coverage, axis_offset, blend_over, falloff, share, slope_color, stamp_alpha
+    Axis, axis_offset, blend_over, falloff, slope_color, stamp_alpha
 }
 
 // A stamp; the twin of `Splat` in `src/overlay/splat.rs`.
@@ -35,14 +35,6 @@ struct TileHeader {
     // Where the tile's splats begin in `splat_list`.
     start: u32,
     count: u32,
-}
-
-// The twin of `TexelState` in `src/overlay/maps.rs`.
-struct TexelState {
-    // Nanolitres.
-    water_nl: u32,
-    // Tick of the first water, 0 if dry ever since.
-    wet_since: u32,
 }
 
 // A drop that fell not long ago; the twin of `RainRing` in `src/overlay/maps.rs`.
@@ -78,8 +70,7 @@ struct SurfaceBatch {
 @group(1) @binding(0) var diffuse_map: texture_storage_2d<rgba8unorm, read_write>;
 @group(1) @binding(1) var specular_map: texture_storage_2d<rgba8unorm, read_write>;
 @group(1) @binding(2) var normal_map: texture_storage_2d<rgba8unorm, read_write>;
-@group(1) @binding(3) var<storage, read_write> state: array<TexelState>;
-@group(1) @binding(4) var<storage, read_write> rings: array<RainRing>;
+@group(1) @binding(3) var<storage, read_write> rings: array<RainRing>;
 
 fn bytes_from_color(color: vec4<f32>) -> vec4<u32> {
     return vec4<u32>(color * 255.0 + 0.5);
@@ -132,27 +123,16 @@ fn paint_splats(
     let tile = tiles[batch.first_tile + workgroup.x];
     let texel = vec2<i32>(vec2(tile.x, tile.y) * 16u + local.xy);
     let size = i32(batch.size);
-    let index = texel.y * size + texel.x;
 
     var diffuse = bytes_from_color(textureLoad(diffuse_map, texel));
     var specular = bytes_from_color(textureLoad(specular_map, texel));
     var normal = bytes_from_color(textureLoad(normal_map, texel));
-    var held = state[index];
     var changed = false;
 
     for (var i = tile.start; i < tile.start + tile.count; i += 1u) {
         let splat = splats[splat_list[i]];
         let u = Axis(splat.center.x, splat.radius.x, size, batch.clamped.x != 0u);
         let v = Axis(splat.center.y, splat.radius.y, size, batch.clamped.y != 0u);
-
-        let water = share(splat.water_nl, axis_coverage(u, texel.x), axis_coverage(v, texel.y));
-        if water > 0u {
-            held.wet_since = select(held.wet_since, splat.tick, held.water_nl == 0u);
-            // Stops at the largest number instead of beginning anew.
-            held.water_nl += min(water, 0xffffffffu - held.water_nl);
-            changed = true;
-        }
-
         let offset = vec2(axis_offset(u, texel.x), axis_offset(v, texel.y));
         let dome = falloff(offset);
         if dome > 0u {
@@ -173,6 +153,5 @@ fn paint_splats(
         textureStore(diffuse_map, texel, color_from_bytes(diffuse));
         textureStore(specular_map, texel, color_from_bytes(specular));
         textureStore(normal_map, texel, color_from_bytes(normal));
-        state[index] = held;
     }
 }

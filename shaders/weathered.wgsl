@@ -58,6 +58,20 @@ fn apply_paint(pbr: ptr<function, PbrInput>, in: VertexOutput) {
 #endif
 }
 
+#ifdef WEATHERED_MARKS
+// Colour of salts.
+const EFFLORESCENCE: vec3<f32> = vec3(0.78, 0.77, 0.74);
+// What a full tide mark leaves of the light.
+const TIDE: vec3<f32> = vec3(0.52, 0.46, 0.40);
+
+// What dried water left on a colour. Salts dissolve where it is wet.
+fn left_behind(color: vec3<f32>, water: Water) -> vec3<f32> {
+    let dry = 1.0 - water.wetness;
+    let marked = color * mix(vec3(1.0), TIDE, porous.tide_mark * water.marks.y);
+    return mix(marked, EFFLORESCENCE, porous.efflorescence * water.marks.x * dry);
+}
+#endif
+
 #ifdef WEATHERED_LIGHT
 // The point with the water on it, lit.
 fn weathered_color(pbr_input: PbrInput, in: VertexOutput) -> vec4<f32> {
@@ -78,6 +92,9 @@ fn weathered_color(pbr_input: PbrInput, in: VertexOutput) -> vec4<f32> {
     var wet_color = pbr.material.base_color.rgb;
 #ifdef WEATHERED_WET_COLOR_TEXTURE
     wet_color = textureSample(wet_color_texture, wet_color_sampler, texture_uv).rgb;
+#endif
+#ifdef WEATHERED_MARKS
+    pbr.material.base_color = vec4(left_behind(pbr.material.base_color.rgb, water), pbr.material.base_color.a);
 #endif
     apply_model(&pbr, &water, surface.r, wet_color * porous.wet_color);
 #ifdef WEATHERED_STANDING

@@ -67,6 +67,31 @@ impl WeatheringClock {
     }
 }
 
+/// The time that is drawn. What surfaces hold is a closed form of time, so they can be shown as they were and as they will
+/// be if nothing happens, back and forth, while the simulation stands still or goes on; it is not touched by that.
+///
+/// Before the last event of a texel, it is shown dry: maps remember the last event, not all of them.
+#[derive(Resource, Reflect, Debug, Default, Clone, Copy, PartialEq)]
+#[reflect(Resource)]
+pub enum ShownTime {
+    /// The present.
+    #[default]
+    Now,
+    /// So many seconds after the start, 0 or more.
+    At(f64),
+}
+
+impl ShownTime {
+    /// The tick that is drawn.
+    pub fn tick(self, clock: &WeatheringClock) -> u32 {
+        match self {
+            Self::Now => clock.tick(),
+            // Saturates, and takes NaN for 0.
+            Self::At(seconds) => (seconds * f64::from(clock.hz())).round() as u32,
+        }
+    }
+}
+
 /// Adds [`WeatheringClock`] and runs `FixedUpdate`, and so the ticks, at its rate.
 pub struct ClockPlugin {
     /// Ticks per second, 1..=[`WeatheringClock::MAX_HZ`].
@@ -82,6 +107,7 @@ impl Default for ClockPlugin {
 impl Plugin for ClockPlugin {
     fn build(&self, app: &mut App) {
         self.insert_clock(app);
+        app.register_type::<ShownTime>().init_resource::<ShownTime>();
         // Every stage of a tick sees its number.
         app.add_systems(WeatheringTick, advance_clock.before(WeatheringSystems::First));
     }
@@ -95,7 +121,8 @@ impl ClockPlugin {
     }
 }
 
-fn advance_clock(mut clock: ResMut<WeatheringClock>) {
+/// One tick on. Runs before every stage of the tick.
+pub fn advance_clock(mut clock: ResMut<WeatheringClock>) {
     clock.advance();
 }
 

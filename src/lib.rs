@@ -13,6 +13,9 @@ pub mod replay;
 pub mod scenario;
 pub mod scenes;
 pub mod schedule;
+pub mod weather;
+//TMP pub mod wetmap;
+pub mod wetting;
 
 use bevy::app::PluginGroupBuilder;
 use bevy::prelude::*;
@@ -28,6 +31,8 @@ pub mod prelude {
     pub use crate::overlay::{Weatherable, Wrap};
     pub use crate::particle::Forces;
     pub use crate::schedule::{WeatheringSystems, WeatheringTick};
+    pub use crate::weather::Weather;
+    pub use crate::wetting::{BecameWet, Dried, WatchWetness, WetnessQuery};
 }
 
 /// Everything: particles, collision, splats, wet materials. Each part can be left out or replaced.
@@ -36,16 +41,20 @@ pub mod prelude {
 /// |---|---|---|
 /// | [`WeatheringSchedulePlugin`](schedule::WeatheringSchedulePlugin) | orders the sets of a tick | no |
 /// | [`ClockPlugin`](clock::ClockPlugin) | counts ticks | no |
+/// | [`WeatherPlugin`](weather::WeatherPlugin) | how warm, dry, windy and sunny it is | no |
 /// | [`EffectPlugin`](effect::EffectPlugin) | loads what falls | no |
 /// | [`EmitterPlugin`](emitter::EmitterPlugin) | spawns particles | no |
 /// | [`ParticlePlugin`](particle::ParticlePlugin) | moves and retires them | no |
 /// | [`CollisionPlugin`](collision::CollisionPlugin) | finds what they hit | no |
 /// | [`DepositPlugin`](overlay::DepositPlugin) | turns impacts into splats | no |
+/// | [`WettingPlugin`](wetting::WettingPlugin) | absorbs, moves and dries water | no |
 /// | [`GpuOverlayPlugin`](overlay::GpuOverlayPlugin) | paints splats into maps | yes |
+/// | [`WaterUploadPlugin`](wetting::gpu::WaterUploadPlugin) | sends water to be drawn | yes |
 /// | [`ParticleDrawPlugin`](particle::ParticleDrawPlugin) | draws particles in flight | yes |
 /// | [`PorousMaterialPlugin`](material::PorousMaterialPlugin) | draws wet surfaces | yes |
 ///
-/// Without a render app the last three do nothing; add [`CpuOverlayPlugin`](overlay::CpuOverlayPlugin) to have maps.
+/// Without a render app the last four do nothing; add [`CpuOverlayPlugin`](overlay::CpuOverlayPlugin) to have colour maps,
+/// too.
 pub struct WeatheringPlugins;
 
 impl PluginGroup for WeatheringPlugins {
@@ -53,12 +62,15 @@ impl PluginGroup for WeatheringPlugins {
         PluginGroupBuilder::start::<Self>()
             .add(schedule::WeatheringSchedulePlugin)
             .add(clock::ClockPlugin::default())
+            .add(weather::WeatherPlugin)
             .add(effect::EffectPlugin)
             .add(emitter::EmitterPlugin)
             .add(particle::ParticlePlugin)
             .add(collision::CollisionPlugin)
             .add(overlay::DepositPlugin)
+            .add(wetting::WettingPlugin)
             .add(overlay::GpuOverlayPlugin)
+            .add(wetting::gpu::WaterUploadPlugin)
             .add(particle::ParticleDrawPlugin)
             .add(material::PorousMaterialPlugin)
     }

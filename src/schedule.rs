@@ -33,8 +33,10 @@ pub enum WeatheringSystems {
     Integrate,
     /// The segment each particle moved is cast against the surfaces; the dead are retired.
     Trace,
-    /// Impacts become splats on the surfaces they hit.
+    /// Impacts become splats, and drops of water, on the surfaces they hit.
     Deposit,
+    /// Water is absorbed, runs, spreads and drips.
+    Flow,
     /// Empty, for systems that want to see the finished tick.
     Last,
 }
@@ -52,7 +54,7 @@ impl Plugin for WeatheringSchedulePlugin {
         app.edit_schedule(WeatheringTick, |tick| {
             tick.set_executor(SingleThreadedExecutor::new());
         })
-        .configure_sets(WeatheringTick, (First, Emit, Integrate, Trace, Deposit, Last).chain())
+        .configure_sets(WeatheringTick, (First, Emit, Integrate, Trace, Deposit, Flow, Last).chain())
         .configure_sets(WeatheringTick, RetireParticles.in_set(Trace))
         .add_systems(FixedUpdate, run_tick);
     }

@@ -7,8 +7,9 @@ use std::mem::offset_of;
 
 use bevy::math::{UVec2, Vec3};
 use bevy::render::render_resource::{ShaderType, encase::UniformBuffer};
-use bevy_weathering::material::PorousUniform;
-use bevy_weathering::overlay::{RainRing, Splat, SurfaceBatch, TexelState, TileHeader};
+use bevy_weathering::material::{GpuDryingPoint, PorousUniform};
+use bevy_weathering::overlay::{RainRing, Splat, SurfaceBatch, TileHeader};
+use bevy_weathering::wetting::gpu::GpuTexelWater;
 use naga::{Expression, Literal, Module, ScalarKind, TypeInner};
 
 const SPLAT: &str = include_str!("../shaders/splat.wgsl");
@@ -75,6 +76,10 @@ impl Words for i32 {
     const KIND: ScalarKind = ScalarKind::Sint;
 }
 
+impl Words for f32 {
+    const KIND: ScalarKind = ScalarKind::Float;
+}
+
 impl<T: Words, const N: usize> Words for [T; N] {
     const KIND: ScalarKind = T::KIND;
 }
@@ -110,9 +115,14 @@ fn a_tile_is_the_same_row_on_both_sides() {
 
 #[test]
 fn a_texel_is_the_same_row_for_the_painter_and_for_the_material() {
-    let rust = rust_layout!(TexelState { water_nl, wet_since });
-    assert_eq!(wgsl_layout(SPLAT, "TexelState"), rust);
-    assert_eq!(wgsl_layout(WET_MAP, "TexelState"), rust);
+    let rust = rust_layout!(GpuTexelWater { amounts, tick, bytes, marks });
+    assert_eq!(wgsl_layout(WET_MAP, "TexelWater"), rust);
+}
+
+#[test]
+fn a_drying_point_is_the_same_row_on_both_sides() {
+    let rust = rust_layout!(GpuDryingPoint { tick, air_mm, sun_mm, air_per_tick, sun_per_tick });
+    assert_eq!(wgsl_layout(WET_MAP, "DryingPoint"), rust);
 }
 
 #[test]
@@ -151,14 +161,21 @@ fn the_constants_of_a_surface_are_read_as_they_are_written() {
         film_x: 19.0,
         backscatter: 20.0,
         t_fill: 21.0,
-        capacity_nl: 22.0,
-        capacity_mm: 23.0,
-        wet_translucency: 24.0,
-        rain_mm_per_h: 25.0,
-        ripple_cell: 26.0,
-        texel_metres: 27.0,
-        size: 28,
-        flags: 30,
+        capacity_mm: 22.0,
+        visible_mm: 23.0,
+        sorptivity_squared: 24.0,
+        reserve_mm: 25.0,
+        efflorescence: 26.0,
+        tide_mark: 27.0,
+        map_ticks: 28.0,
+        map_fill: 29.0,
+        map_tick: 30,
+        wet_translucency: 31.0,
+        rain_mm_per_h: 32.0,
+        ripple_cell: 33.0,
+        texel_metres: 34.0,
+        size: 35,
+        flags: 36,
     };
     let floats = |values: &[f32]| (ScalarKind::Float, values.iter().map(|value| value.to_bits()).collect());
     let expected: Vec<(&str, (ScalarKind, Vec<u32>))> = vec![
@@ -177,14 +194,21 @@ fn the_constants_of_a_surface_are_read_as_they_are_written() {
         ("film_x", floats(&[19.0])),
         ("backscatter", floats(&[20.0])),
         ("t_fill", floats(&[21.0])),
-        ("capacity_nl", floats(&[22.0])),
-        ("capacity_mm", floats(&[23.0])),
-        ("wet_translucency", floats(&[24.0])),
-        ("rain_mm_per_h", floats(&[25.0])),
-        ("ripple_cell", floats(&[26.0])),
-        ("texel_metres", floats(&[27.0])),
-        ("size", (ScalarKind::Uint, vec![28])),
-        ("flags", (ScalarKind::Uint, vec![30])),
+        ("capacity_mm", floats(&[22.0])),
+        ("visible_mm", floats(&[23.0])),
+        ("sorptivity_squared", floats(&[24.0])),
+        ("reserve_mm", floats(&[25.0])),
+        ("efflorescence", floats(&[26.0])),
+        ("tide_mark", floats(&[27.0])),
+        ("map_ticks", floats(&[28.0])),
+        ("map_fill", floats(&[29.0])),
+        ("map_tick", (ScalarKind::Uint, vec![30])),
+        ("wet_translucency", floats(&[31.0])),
+        ("rain_mm_per_h", floats(&[32.0])),
+        ("ripple_cell", floats(&[33.0])),
+        ("texel_metres", floats(&[34.0])),
+        ("size", (ScalarKind::Uint, vec![35])),
+        ("flags", (ScalarKind::Uint, vec![36])),
     ];
     let mut buffer = UniformBuffer::new(Vec::new());
     buffer.write(&written).unwrap();
@@ -220,6 +244,7 @@ fn flags_are_the_same_bits_on_both_sides() {
         ("FLAG_POROSITY_TEXTURE", PorousUniform::FLAG_POROSITY_TEXTURE),
         ("FLAG_POROSITY_GLOSS", PorousUniform::FLAG_POROSITY_GLOSS),
         ("FLAG_METALNESS_FROM_SPECULAR", PorousUniform::FLAG_METALNESS_FROM_SPECULAR),
+        ("FLAG_MAP_DRIES", PorousUniform::FLAG_MAP_DRIES),
     ];
     assert_eq!(in_shader.collect::<Vec<_>>(), in_rust);
 }

@@ -131,7 +131,7 @@ fn files_below(folder: &Path) -> BTreeSet<String> {
 
 /// The files of a finished run.
 fn expected_files(surfaces: &[&str], frames: u32) -> BTreeSet<String> {
-    let maps = ["diffuse", "specular", "normal", "water", "wet_since"];
+    let maps = ["diffuse", "specular", "normal", "film", "absorbed", "wetness", "since"];
     let maps = surfaces.iter().flat_map(|name| maps.map(|map| format!("maps/{name}_{map}.png")));
     let frames = (0..frames).map(|frame| format!("frame_{frame:05}.png"));
     maps.chain(frames).chain(["report.json".into()]).collect()
@@ -249,12 +249,15 @@ fn the_numbers_of_a_report_add_up() {
     let impacts: f64 = surfaces(&report).iter().map(|surface| number(&surface["impacts"])).sum();
     assert_eq!(impacts, hit);
     for surface in surfaces(&report) {
-        let (water, received) = (number(&surface["water_mm3"]), number(&surface["received_mm3"]));
-        assert!((water - received).abs() <= 1e-6 * received, "{surface}");
-        let wet = number(&surface["wet_fraction"]);
+        let part = |name: &str| number(&surface[name]);
+        let received = part("received_mm3");
+        let found = part("film_mm3") + part("absorbed_mm3") + part("evaporated_mm3") + part("dripped_mm3");
+        assert!((found - received).abs() <= 1e-9 * received, "{surface}");
+        let wet = part("wet_fraction");
         assert!((0.0..=1.0).contains(&wet), "{surface}");
-        assert_eq!(wet > 0.0, water > 0.0, "{surface}");
+        assert_eq!(wet > 0.0, received > 0.0, "{surface}");
     }
+    assert!(number(&report["water"]["imbalance"]).abs() < 1e-9, "{}", report["water"]);
     assert_eq!(triangle_counts(&report), [("ground", 1584), ("sphere", 936), ("bunny", 1000)]);
 }
 
@@ -277,13 +280,15 @@ fn out_holds_the_report_and_the_maps_and_nothing_else() {
 
     for surface in surfaces(&report) {
         let name = surface["name"].as_str().unwrap();
-        let water = grey_map(&out, &format!("{name}_water.png"));
-        let wet_since = grey_map(&out, &format!("{name}_wet_since.png"));
-        assert_eq!(water.iter().any(|&film| film > 0), number(&surface["water_mm3"]) > 0.0, "{name}");
-        // A film of less than half a micrometre is written as 0.
-        let wet = |(film, since): (&u16, &u16)| *film == 0 || *since > 0;
-        assert!(water.iter().zip(&wet_since).all(wet), "{name}: water that came at no time");
-        assert!(wet_since.iter().all(|&since| since <= 200), "{name}: water from the future");
+        let film = grey_map(&out, &format!("{name}_film.png"));
+        let absorbed = grey_map(&out, &format!("{name}_absorbed.png"));
+        let since = grey_map(&out, &format!("{name}_since.png"));
+        let water: Vec<u16> = film.iter().zip(&absorbed).map(|(film, pores)| film + pores).collect();
+        assert_eq!(water.iter().any(|&um| um > 0), number(&surface["received_mm3"]) > 0.0, "{name}");
+        // Less than half a micrometre is written as 0.
+        let wet = |(um, since): (&u16, &u16)| *um == 0 || *since > 0;
+        assert!(water.iter().zip(&since).all(wet), "{name}: water that came at no time");
+        assert!(since.iter().all(|&since| since <= 200), "{name}: water from the future");
         for map in ["diffuse", "specular", "normal"] {
             let image = image::open(out.join(format!("maps/{name}_{map}.png"))).unwrap();
             assert_eq!(image.color(), image::ColorType::Rgba8, "{name} {map}");
@@ -293,19 +298,22 @@ fn out_holds_the_report_and_the_maps_and_nothing_else() {
 }
 
 #[test]
-fn the_water_map_holds_the_water_in_micrometres() {
+fn the_maps_hold_the_water_in_micrometres() {
     let tree = Tree::new();
     let out = tree.path("out");
     run(replay(tree.tap(), "--no-render --out").arg(&out)).assert_success();
-    let water = grey_map(&out, "ground_water.png");
-    let film_um: f64 = water.iter().copied().map(f64::from).sum();
-    // A square metre; a micrometre on a mm² is a thousandth of a mm³.
-    let texel_mm2 = 1.0e6 / water.len() as f64;
-    let expected = number(&read_report(&out)["surfaces"][0]["water_mm3"]);
-    let actual = film_um * texel_mm2 / 1000.0;
-    assert!(expected > 0.0);
-    // Each value is rounded, and texels on the edge of two triangles count for both.
-    assert!((actual / expected - 1.0).abs() < 0.02, "{actual} mm³ in the map, {expected} mm³ in the report");
+    let report = read_report(&out);
+    for (map, field) in [("film", "film_mm3"), ("absorbed", "absorbed_mm3")] {
+        let texels = grey_map(&out, &format!("ground_{map}.png"));
+        let sum: f64 = texels.iter().copied().map(f64::from).sum();
+        // A square metre; a micrometre on a mm² is a thousandth of a mm³.
+        let texel_mm2 = 1.0e6 / texels.len() as f64;
+        let expected = number(&report["surfaces"][0][field]);
+        let actual = sum * texel_mm2 / 1000.0;
+        assert!(expected > 0.0, "{map}");
+        // Each value is rounded.
+        assert!((actual / expected - 1.0).abs() < 0.02, "{actual} mm³ in the map, {expected} mm³ in the report");
+    }
 }
 
 #[test]

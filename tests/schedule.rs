@@ -8,12 +8,13 @@ use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 use bevy_weathering::WeatheringPlugins;
 use bevy_weathering::clock::WeatheringClock;
-use bevy_weathering::collision::{SurfaceCollider, SurfaceImpact};
+use bevy_weathering::collision::SurfaceImpact;
 use bevy_weathering::material::WeatheredMaterial;
-use bevy_weathering::overlay::{CpuMaps, CpuOverlayPlugin, SurfaceTotals};
+use bevy_weathering::overlay::{CpuOverlayPlugin, SurfaceTotals};
 use bevy_weathering::particle::{ParticleCounts, Position, integrate_particles};
 use bevy_weathering::prelude::*;
 use bevy_weathering::scenario::{Scenario, ScenarioPlugin};
+use bevy_weathering::wetting::SurfaceWater;
 
 fn headless() -> App {
     let mut app = App::new();
@@ -144,7 +145,7 @@ fn rain_wets_a_plane_without_a_renderer() {
             Transform::default(),
         ))
         .id();
-    while app.world().get::<SurfaceCollider>(surface).is_none() {
+    while app.world().get::<SurfaceWater>(surface).is_none() {
         app.update();
     }
     let effect = app.world_mut().resource_mut::<Assets<WeatherEffect>>().add(WeatherEffect::default());
@@ -169,6 +170,6 @@ fn rain_wets_a_plane_without_a_renderer() {
     assert_eq!(counts.emitted, counts.alive + counts.hit + counts.expired);
     let totals = *app.world().get::<SurfaceTotals>(surface).unwrap();
     assert_eq!((totals.impacts, messages), (counts.hit, counts.hit));
-    let maps = app.world().get::<CpuMaps>(surface).unwrap();
-    assert_eq!(maps.water_nl(), totals.water_nl);
+    let water = app.world().get::<SurfaceWater>(surface).unwrap();
+    assert_eq!(water.ledger().received, water.units().from_nl(totals.water_nl));
 }

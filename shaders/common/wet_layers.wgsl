@@ -58,7 +58,7 @@ fn point_from_pbr(in: PbrInput, input: lighting::LightingInput, water: Water, no
     var levelled = water.levelness;
 #ifdef WEATHERED_PORES
     point.alpha_poro = porous.porosity * (1.0 - in.material.metallic);
-    levelled = max(levelled, PORE_LEVELLING * water.wetness * (1.0 - water.coverage));
+    levelled = max(levelled, PORE_LEVELLING * water.gloss * (1.0 - water.coverage));
 #endif
     point.surface.N = normalize(mix(in.N, normal, levelled));
     point.surface.R = reflect(-in.V, point.surface.N);
@@ -89,7 +89,9 @@ fn matter_coefficients(point: Point, input: ptr<function, lighting::LightingInpu
     } else {
         (*input).diffuse_color *= kd / max(terms.kd_dry, vec3(1e-6));
     }
-    return terms.water * (1.0 - point.water.coverage);
+    // The mirror goes before the darkening; it grows evenly with what is filled.
+    let mirror = terms.water * point.water.gloss / max(point.water.wetness, 1e-4);
+    return mirror * (1.0 - point.water.coverage);
 #else
     return 0.0;
 #endif

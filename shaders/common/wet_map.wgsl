@@ -2,7 +2,8 @@
 
 #define_import_path bevy_weathering::wet_map
 
-#import bevy_weathering::held_water::water_look
+#import bevy_weathering::drying::{Amounts, evolve, water_look}
+#import bevy_weathering::hnat::wet_tau
 #import bevy_weathering::ripples::{ring_slope, RING_SECONDS}
 
 // Constants of a surface; the twin of `PorousUniform` in `src/material/extension.rs`.
@@ -37,10 +38,21 @@ struct PorousUniform {
     backscatter: f32,
     // Seconds from the first water until a texel looks wet.
     t_fill: f32,
-    // Nanolitres that make a texel look fully wet.
-    capacity_nl: f32,
-    // The same in mm.
+    // What the pores hold, mm.
     capacity_mm: f32,
+    // Absorbed water that looks fully wet, mm, above 0.
+    visible_mm: f32,
+    // The square of the sorptivity, mm^2/s.
+    sorptivity_squared: f32,
+    // What 255 of a texel's reserve stand for, mm.
+    reserve_mm: f32,
+    // Strength of efflorescence and tide marks, 0..=1.
+    efflorescence: f32,
+    tide_mark: f32,
+    // A played wet map: ticks it takes from dry to wet, t_fill as a part of that, and the tick it began at.
+    map_ticks: f32,
+    map_fill: f32,
+    map_tick: u32,
     // Diffuse transmission when soaked, 0..=1.
     wet_translucency: f32,
     // Rain whose drops are not simulated, mm/h.
@@ -55,18 +67,37 @@ struct PorousUniform {
     flags: u32,
 }
 
-// The twin of `TexelState` in `src/overlay/maps.rs`.
-struct TexelState {
-    // Nanolitres.
-    water_nl: u32,
-    // Tick of the first water, 0 if dry ever since.
-    wet_since: u32,
+// The twin of `GpuTexelWater` in `src/wetting/gpu.rs`.
+struct TexelWater {
+    // Film and absorbed water, mm, two halves.
+    amounts: u32,
+    // Reference tick; 0 if it never was wet.
+    tick: u32,
+    // From the lowest byte: how wet it looked then, exposure to air and to the sun, reserve.
+    bytes: u32,
+    // Efflorescence, tide mark.
+    marks: u32,
 }
 
-// Ticks since the start, and ticks per second.
+// From a tick on, the weather takes so much a tick; until then it took so much. mm. The twin of `GpuDryingPoint` in
+// `src/material/clock.rs`.
+struct DryingPoint {
+    tick: u32,
+    air_mm: f32,
+    sun_mm: f32,
+    air_per_tick: f32,
+    sun_per_tick: f32,
+}
+
+// The time, and the integral of what the weather takes.
 struct Clock {
+    // Ticks since the start, and ticks per second.
     tick: u32,
     hz: u32,
+    // Points, at least 1, in order.
+    count: u32,
+    pad: u32,
+    points: array<DryingPoint>,
 }
 
 // A drop that fell not long ago; the twin of `RainRing` in `src/overlay/maps.rs`.
@@ -89,6 +120,7 @@ const FLAG_LEVEL: u32 = 64u;
 const FLAG_POROSITY_TEXTURE: u32 = 128u;
 const FLAG_POROSITY_GLOSS: u32 = 256u;
 const FLAG_METALNESS_FROM_SPECULAR: u32 = 512u;
+const FLAG_MAP_DRIES: u32 = 1024u;
 
 // Texels along each side of a tile, and drops that a tile remembers.
 const TILE_SIZE: i32 = 16;
@@ -104,13 +136,15 @@ const STEEPEST_DROP_NL: f32 = 65000.0;
 @group(#{MATERIAL_BIND_GROUP}) @binding(102) var map_sampler: sampler;
 @group(#{MATERIAL_BIND_GROUP}) @binding(103) var specular_map: texture_2d<f32>;
 @group(#{MATERIAL_BIND_GROUP}) @binding(104) var normal_map: texture_2d<f32>;
-@group(#{MATERIAL_BIND_GROUP}) @binding(105) var<storage, read> state: array<TexelState>;
+@group(#{MATERIAL_BIND_GROUP}) @binding(105) var<storage, read> state: array<TexelWater>;
 @group(#{MATERIAL_BIND_GROUP}) @binding(106) var<storage, read> clock: Clock;
 @group(#{MATERIAL_BIND_GROUP}) @binding(107) var<storage, read> rings: array<RainRing>;
 @group(#{MATERIAL_BIND_GROUP}) @binding(108) var surface_texture: texture_2d<f32>;
 @group(#{MATERIAL_BIND_GROUP}) @binding(109) var surface_sampler: sampler;
 @group(#{MATERIAL_BIND_GROUP}) @binding(110) var wet_color_texture: texture_2d<f32>;
 @group(#{MATERIAL_BIND_GROUP}) @binding(111) var wet_color_sampler: sampler;
+@group(#{MATERIAL_BIND_GROUP}) @binding(112) var played_map: texture_2d<f32>;
+@group(#{MATERIAL_BIND_GROUP}) @binding(113) var played_sampler: sampler;
 
 fn has_flag(flag: u32) -> bool {
     return (porous.flags & flag) != 0u;
@@ -126,23 +160,103 @@ fn seconds_since(tick: u32) -> f32 {
     return f32(i32(clock.tick - tick)) / f32(clock.hz);
 }
 
-fn texel_water(texel: vec2<i32>) -> vec2<f32> {
+// What the weather could have taken until a tick, from air and sun.
+fn demand_until(tick: u32) -> vec2<f32> {
+    let point = clock.points[point_at(tick)];
+    return vec2(point.air_mm, point.sun_mm) + vec2(point.air_per_tick, point.sun_per_tick) * f32(tick - point.tick);
+}
+
+// The last point at or before a tick.
+fn point_at(tick: u32) -> u32 {
+    var low = 0u;
+    var high = clock.count;
+    while high - low > 1u {
+        let middle = (low + high) / 2u;
+        if clock.points[middle].tick <= tick {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return low;
+}
+
+// The same from a tick until now. While the weather stays, a product: a difference of large sums would stutter.
+fn demand_since(tick: u32) -> vec2<f32> {
+    let now = max(clock.tick, tick);
+    let last = clock.points[clock.count - 1u];
+    if tick >= last.tick {
+        return vec2(last.air_per_tick, last.sun_per_tick) * f32(now - tick);
+    }
+    return demand_until(now) - demand_until(tick);
+}
+
+// Water at a point as it is held and looks.
+struct Held {
+    // How wet, how glossy, film in mm.
+    look: vec3<f32>,
+    // Efflorescence and tide mark, 0..=1.
+    marks: vec2<f32>,
+}
+
+// Water that has to dry in one place until there is no more to see, mm, and how much faster a tide mark grows.
+const MARK_FULL_MM: f32 = 2.0;
+const MARK_RIM_GAIN: f32 = 6.0;
+
+// A texel of the state; tiles lie one after the other.
+fn texel_held(texel: vec2<i32>) -> Held {
     let size = i32(porous.size);
     let x = wrapped(texel.x, size, has_flag(FLAG_CLAMP_U));
     let y = wrapped(texel.y, size, has_flag(FLAG_CLAMP_V));
-    let held = state[y * size + x];
-    return water_look(held.water_nl, seconds_since(held.wet_since), porous.capacity_nl, porous.capacity_mm, porous.t_fill);
+    let tile = (y / TILE_SIZE) * (size / TILE_SIZE) + x / TILE_SIZE;
+    let stored = state[tile * TILE_SIZE * TILE_SIZE + (y % TILE_SIZE) * TILE_SIZE + x % TILE_SIZE];
+    var held: Held;
+    held.marks = unpack4x8unorm(stored.marks).xy;
+    if stored.tick == 0u || stored.tick > clock.tick {
+        return held;
+    }
+    let depths = unpack2x16float(stored.amounts);
+    let bytes = unpack4x8unorm(stored.bytes);
+    let before = Amounts(depths.x, depths.y, bytes.w * porous.reserve_mm);
+    let seconds = seconds_since(stored.tick);
+    // The byte of the air's share is 128 where it is 1.
+    let demand = dot(demand_since(stored.tick), vec2(bytes.y * (255.0 / 128.0), bytes.z));
+    let now = evolve(before, porous.sorptivity_squared, porous.capacity_mm, seconds, demand);
+    held.look = vec3(water_look(now.pores_mm, porous.visible_mm, bytes.x, seconds, porous.t_fill), now.film_mm);
+#ifdef WEATHERED_MARKS
+    let dried = max(before.pores_mm - now.film_mm - now.pores_mm, 0.0) / MARK_FULL_MM;
+    let rim = max(1.0 - 3.0 * bytes.w, 0.0);
+    held.marks = min(held.marks + dried * vec2(1.0, MARK_RIM_GAIN * rim), vec2(1.0));
+#endif
+    return held;
 }
 
-// How wet a point looks now, 0..=1, and the film on it in mm; bilinear between texels.
-fn water_at(uv: vec2<f32>) -> vec2<f32> {
+fn mix_held(a: Held, b: Held, part: f32) -> Held {
+    return Held(mix(a.look, b.look, part), mix(a.marks, b.marks, part));
+}
+
+// What a point holds and how it looks now; bilinear between texels.
+fn held_at(uv: vec2<f32>) -> Held {
     let position = uv * f32(porous.size) - 0.5;
     let corner = floor(position);
     let part = position - corner;
     let texel = vec2<i32>(corner);
-    let upper = mix(texel_water(texel), texel_water(texel + vec2(1, 0)), part.x);
-    let lower = mix(texel_water(texel + vec2(0, 1)), texel_water(texel + vec2(1, 1)), part.x);
-    return mix(upper, lower, part.y);
+    let upper = mix_held(texel_held(texel), texel_held(texel + vec2(1, 0)), part.x);
+    let lower = mix_held(texel_held(texel + vec2(0, 1)), texel_held(texel + vec2(1, 1)), part.x);
+    return mix_held(upper, lower, part.y);
+}
+
+// How wet the played map says a point is, 0..=1. Grey g wets at (1 - g)(1 - t_fill), 0 never; drying is that backwards.
+fn played_at(uv: vec2<f32>) -> f32 {
+    let grey = textureSampleLevel(played_map, played_sampler, uv, 0.0).r;
+    var time = f32(i32(clock.tick - porous.map_tick)) / porous.map_ticks;
+    if has_flag(FLAG_MAP_DRIES) {
+        time = 1.0 - time;
+    }
+    if grey <= 0.0 {
+        return 0.0;
+    }
+    return wet_tau(time, (1.0 - grey) * (1.0 - porous.map_fill), porous.map_fill);
 }
 
 // Slopes along u and v of the rings around drops that fell not long ago.

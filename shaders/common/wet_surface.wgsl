@@ -14,15 +14,19 @@
     twomey,
     water_film::{film_coverage, film_levelness},
     wet_map::{
-        porous, clock, has_flag, seconds_since, water_at, drop_slopes,
+        porous, clock, has_flag, seconds_since, held_at, played_at, drop_slopes,
         FLAG_ACCUMULATION, FLAG_LEVEL, FLAG_METALNESS_FROM_SPECULAR, FLAG_POROSITY_GLOSS, FLAG_POROSITY_TEXTURE,
     },
 }
 
 // Water at a point.
 struct Water {
-    // Of the matter, 0..=1.
+    // Of the matter, 0..=1: what darkens it.
     wetness: f32,
+    // How much of its pores mirrors, 0..=1.
+    gloss: f32,
+    // Efflorescence and tide mark, 0..=1.
+    marks: vec2<f32>,
     // Depth above the matter, mm.
     film_mm: f32,
     // Part of the point under water, 0..=1.
@@ -40,9 +44,16 @@ const ACCUMULATED_MM: f32 = 5.0;
 fn water_on(uv: vec2<f32>, height: f32, paint: f32) -> Water {
     var water: Water;
 #ifdef WEATHERED_WATER
-    let held = water_at(uv);
-    water.wetness = held.x;
-    water.film_mm = held.y;
+    let held = held_at(uv);
+    water.wetness = held.look.x;
+    water.gloss = held.look.y;
+    water.film_mm = held.look.z;
+    water.marks = held.marks;
+#endif
+#ifdef WEATHERED_PLAYED_MAP
+    let played = played_at(uv);
+    water.wetness = max(water.wetness, played);
+    water.gloss = max(water.gloss, played);
 #endif
 #ifdef WEATHERED_STANDING
     if has_flag(FLAG_LEVEL) {
@@ -58,10 +69,12 @@ fn water_on(uv: vec2<f32>, height: f32, paint: f32) -> Water {
         water.coverage = max(water.coverage, stands);
         water.levelness = max(water.levelness, stands);
         water.wetness = saturate(water.wetness + stands);
+        water.gloss = saturate(water.gloss + stands);
     }
 #endif
     // What is under water is wet.
     water.wetness = max(water.wetness, water.coverage);
+    water.gloss = max(water.gloss, water.coverage);
     return water;
 }
 
@@ -88,6 +101,8 @@ fn apply_model(pbr: ptr<function, PbrInput>, water: ptr<function, Water>, painte
     let metallic = (*pbr).material.metallic;
     let roughness = (*pbr).material.perceptual_roughness;
     let wetness = (*water).wetness;
+    let gloss = (*water).gloss;
+    let glossy = gloss * porous.porosity * (1.0 - metallic);
     let soaked = wetness * porous.porosity * (1.0 - metallic);
     var color = base;
 #ifdef WEATHERED_LAGARDE
@@ -104,19 +119,19 @@ fn apply_model(pbr: ptr<function, PbrInput>, water: ptr<function, Water>, painte
     }
     let f = lagarde::kept_albedo(porosity, metalness);
     color = lagarde::wet_albedo(base, f, wetness);
-    (*pbr).material.perceptual_roughness = lagarde::wet_roughness(roughness, f, wetness);
+    (*pbr).material.perceptual_roughness = lagarde::wet_roughness(roughness, f, gloss);
 #endif
 #ifdef WEATHERED_LEKNER_DORF
     color = mix(base, lekner_dorf::wet_diffuse(base, porous.film_x, porous.film_p), soaked);
-    (*water).coverage = max((*water).coverage, soaked);
+    (*water).coverage = max((*water).coverage, glossy);
 #endif
 #ifdef WEATHERED_TWOMEY
     color = mix(base, twomey::wet_albedo(base, porous.backscatter), soaked);
 #endif
 #ifdef WEATHERED_AUTHORED
     color = authored(base, wet_color, soaked);
-    (*pbr).material.perceptual_roughness = authored(vec3(roughness), vec3(porous.wet_roughness), soaked).x;
-    (*pbr).material.reflectance = authored((*pbr).material.reflectance, vec3(porous.wet_reflectance), soaked);
+    (*pbr).material.perceptual_roughness = authored(vec3(roughness), vec3(porous.wet_roughness), glossy).x;
+    (*pbr).material.reflectance = authored((*pbr).material.reflectance, vec3(porous.wet_reflectance), glossy);
 #endif
     (*pbr).material.base_color = vec4(color, (*pbr).material.base_color.a);
 }

@@ -7,7 +7,7 @@ use super::{EmissionSeed, Emitter};
 use crate::clock::WeatheringClock;
 use crate::effect::EffectTable;
 use crate::particle::{
-    Lifespan, ParticleBundle, ParticleConfig, ParticleCounts, Position, Sequence, Velocity, Volume,
+    Lifespan, ParticleBundle, ParticleConfig, ParticleCounts, Position, Sequence, Velocity, Volume, WaterCounts,
 };
 
 /// What an [`Emitter`] has sent out and still owes.
@@ -54,7 +54,19 @@ pub struct NewParticles {
 impl NewParticles {
     /// Starts numbering again from 0, for a new run in a world without particles.
     pub fn restart(&mut self) {
+        self.particles.clear();
         self.next_sequence = 0;
+    }
+
+    /// Water of those that wait to be spawned, nanolitres.
+    pub fn waiting_nl(&self) -> u64 {
+        self.particles.iter().map(|particle| u64::from(particle.3.0)).sum()
+    }
+
+    /// Adds one more particle, which gets the next number.
+    pub fn push(&mut self, particle: impl FnOnce(u32) -> ParticleBundle) {
+        self.particles.push(particle(self.next_sequence));
+        self.next_sequence = self.next_sequence.wrapping_add(1);
     }
 }
 
@@ -65,6 +77,7 @@ pub fn emit_particles(
     config: Res<ParticleConfig>,
     mut effects: ResMut<EffectTable>,
     mut counts: ResMut<ParticleCounts>,
+    mut water: ResMut<WaterCounts>,
     mut new: ResMut<NewParticles>,
     mut order: Local<Vec<(u32, Entity)>>,
     mut emitters: Query<(&Emitter, &mut EmitterState, &GlobalTransform)>,
@@ -74,7 +87,6 @@ pub fn emit_particles(
     order.extend(streams.iter().map(|(emitter, id)| (emitter.stream, id)));
     order.sort_unstable();
 
-    let NewParticles { particles, next_sequence } = &mut *new;
     let (mut stream, mut twins) = (None, 0u32);
     for &(number, entity) in order.iter() {
         twins = if stream.replace(number) == Some(number) { twins + 1 } else { 0 };
@@ -90,7 +102,7 @@ pub fn emit_particles(
         let own_stream = || Pcg32::new(seed.0, u64::from(number) | u64::from(twins) << 32);
         let mut rng = state.rng.take().unwrap_or_else(own_stream);
         let (due, first, interval) = state.due(emitter.rate, clock.hz());
-        let room = u64::from(config.max_alive).saturating_sub(counts.alive + particles.len() as u64);
+        let room = u64::from(config.max_alive).saturating_sub(counts.alive + new.particles.len() as u64);
         let count = u64::from(due).min(room) as u32;
         counts.refused += u64::from(due - count);
         state.emitted += u64::from(count);
@@ -101,15 +113,11 @@ pub fn emit_particles(
         for i in 0..count {
             let (position, velocity) = emitter.sample(&world_from_emitter, &mut rng);
             let born_at = ((first + f64::from(i) * interval) * 65_536.0).clamp(0.0, 65_535.0) as u16;
-            particles.push((
-                Position(position),
-                Velocity(velocity),
-                Lifespan { ticks_left, born_at },
-                Volume(state.water_nl(effect.water_mm3)),
-                Sequence(*next_sequence),
-                index,
-            ));
-            *next_sequence = next_sequence.wrapping_add(1);
+            let volume = state.water_nl(effect.water_mm3);
+            water.emitted_nl += u64::from(volume);
+            let life = Lifespan { ticks_left, born_at };
+            let particle = (Position(position), Velocity(velocity), life, Volume(volume));
+            new.push(|number| (particle.0, particle.1, particle.2, particle.3, Sequence(number), index));
         }
         state.rng = Some(rng);
     }
@@ -139,6 +147,7 @@ mod tests {
         world.insert_resource(EmissionSeed(7));
         world.init_resource::<ParticleConfig>();
         world.init_resource::<ParticleCounts>();
+        world.init_resource::<WaterCounts>();
         world.init_resource::<NewParticles>();
         let mut table = EffectTable::default();
         table.insert(Handle::default(), effect);

@@ -7,8 +7,9 @@ use bevy::prelude::*;
 use super::uniform::SurfaceLook;
 use super::warm_up::{ShaderChanges, Understudy, rehearse};
 use super::{
-    ClockBuffer, PorousExtension, PorousMaterial, StandingWater, WeatheredMaterial, WettingTextures,
+    ClockBuffer, PlayedWetMap, PorousExtension, PorousMaterial, StandingWater, WeatheredMaterial, WettingTextures,
 };
+use crate::clock::WeatheringClock;
 use crate::overlay::{Overlays, SurfaceTraces, TexelAreas, Weatherable};
 
 /// The material a weathered entity had. Its asset may go on being edited: the weathered form follows.
@@ -23,6 +24,7 @@ type Surface = (
     Option<&'static PorousMaterial>,
     Option<&'static StandingWater>,
     Option<&'static WettingTextures>,
+    Option<&'static PlayedWetMap>,
 );
 
 /// What changes the constants of a surface.
@@ -30,21 +32,24 @@ type Edited = Or<(
     Changed<PorousMaterial>,
     Changed<StandingWater>,
     Changed<WettingTextures>,
+    Changed<PlayedWetMap>,
     Changed<Overlays>,
     Changed<TexelAreas>,
     Changed<SurfaceTraces>,
 )>;
 
 fn extension(
-    (maps, areas, traces, porous, standing, textures): (
+    (maps, areas, traces, porous, standing, textures, played): (
         &Overlays,
         &TexelAreas,
         &SurfaceTraces,
         Option<&PorousMaterial>,
         Option<&StandingWater>,
         Option<&WettingTextures>,
+        Option<&PlayedWetMap>,
     ),
-    clock: &ClockBuffer,
+    buffer: &ClockBuffer,
+    clock: &WeatheringClock,
 ) -> PorousExtension {
     let none = WettingTextures::default();
     let look = SurfaceLook {
@@ -53,9 +58,12 @@ fn extension(
         textures: textures.unwrap_or(&none),
         maps,
         areas,
+        played,
+        hz: clock.hz(),
         traces: *traces,
     };
-    PorousExtension::new(look.key(), look.uniform(), maps, look.textures, clock.0.clone())
+    let played = played.map(|played| played.map.clone());
+    PorousExtension::new(look.key(), look.uniform(), maps, look.textures, played, buffer.0.clone())
 }
 
 /// The dry material as the weathered one needs it.
@@ -73,7 +81,8 @@ fn weathered_base(dry: &StandardMaterial, extension: &PorousExtension) -> Standa
 /// Exchanges the material of surfaces that have their maps; also of entities that a glTF scene spawns later.
 pub(super) fn exchange_materials(
     mut commands: Commands,
-    clock: Res<ClockBuffer>,
+    buffer: Res<ClockBuffer>,
+    clock: Res<WeatheringClock>,
     deferred_cameras: Query<(), With<DeferredPrepass>>,
     standard: Res<Assets<StandardMaterial>>,
     mut weathered: ResMut<Assets<WeatheredMaterial>>,
@@ -84,7 +93,7 @@ pub(super) fn exchange_materials(
         if dry.opaque_render_method != OpaqueRendererMethod::Forward && !deferred_cameras.is_empty() {
             info_once!("weathered surfaces are drawn forward, before cameras with a deferred prepass, too");
         }
-        let extension = extension(surface, &clock);
+        let extension = extension(surface, &buffer, &clock);
         let handle = weathered.add(WeatheredMaterial { base: weathered_base(dry, &extension), extension });
         commands
             .entity(entity)
@@ -127,7 +136,8 @@ pub(super) fn follow_dry_materials(
 /// Copies what users edit, new maps, and the first water into the weathered material.
 pub(super) fn follow_surfaces(
     mut commands: Commands,
-    clock: Res<ClockBuffer>,
+    buffer: Res<ClockBuffer>,
+    clock: Res<WeatheringClock>,
     changes: Res<ShaderChanges>,
     standard: Res<Assets<StandardMaterial>>,
     mut weathered: ResMut<Assets<WeatheredMaterial>>,
@@ -136,7 +146,7 @@ pub(super) fn follow_surfaces(
 ) {
     for (entity, surface, dry, handle) in &changed {
         let Some(mut material) = weathered.get_mut(handle) else { continue };
-        let extension = extension(surface, &clock);
+        let extension = extension(surface, &buffer, &clock);
         if let Some(dry) = standard.get(&dry.0) {
             material.base = weathered_base(dry, &extension);
         }

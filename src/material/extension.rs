@@ -53,6 +53,10 @@ pub struct PorousExtension {
     #[texture(110)]
     #[sampler(111)]
     pub wet_color: Option<Handle<Image>>,
+    /// See [`PlayedWetMap::map`](super::PlayedWetMap::map).
+    #[texture(112)]
+    #[sampler(113)]
+    pub played: Option<Handle<Image>>,
 }
 
 /// [`PorousMaterial`](super::PorousMaterial) and [`StandingWater`](super::StandingWater) as the shader reads them:
@@ -75,8 +79,15 @@ pub struct PorousUniform {
     pub film_x: f32,
     pub backscatter: f32,
     pub t_fill: f32,
-    pub capacity_nl: f32,
     pub capacity_mm: f32,
+    pub visible_mm: f32,
+    pub sorptivity_squared: f32,
+    pub reserve_mm: f32,
+    pub efflorescence: f32,
+    pub tide_mark: f32,
+    pub map_ticks: f32,
+    pub map_fill: f32,
+    pub map_tick: u32,
     pub wet_translucency: f32,
     pub rain_mm_per_h: f32,
     pub ripple_cell: f32,
@@ -92,6 +103,7 @@ impl PorousExtension {
         params: PorousUniform,
         maps: &Overlays,
         textures: &WettingTextures,
+        played: Option<Handle<Image>>,
         clock: Handle<ShaderBuffer>,
     ) -> Self {
         Self {
@@ -105,6 +117,7 @@ impl PorousExtension {
             rings: maps.rings.clone(),
             surface: textures.surface.clone(),
             wet_color: textures.wet_color.clone(),
+            played,
         }
     }
 }

@@ -18,6 +18,10 @@ pub struct PorousKey {
     pub standing: bool,
     /// It looks other than its `StandardMaterial` when dry, too.
     pub unlike_standard: bool,
+    /// Drying leaves something behind.
+    pub marks: bool,
+    /// A [`PlayedWetMap`](super::PlayedWetMap) is there.
+    pub played_map: bool,
     /// [`WettingTextures::surface`](super::WettingTextures::surface) is there.
     pub surface_texture: bool,
     /// [`WettingTextures::wet_color`](super::WettingTextures::wet_color) is there.
@@ -67,12 +71,14 @@ impl ModelKind {
 
 impl PorousKey {
     pub(super) fn shader_defs(self) -> impl Iterator<Item = ShaderDefVal> {
-        let own_light = self.water || self.standing || self.unlike_standard;
+        let own_light = self.water || self.standing || self.played_map || self.unlike_standard;
         let defs = [
             (own_light, "WEATHERED_LIGHT"),
             (self.water, "WEATHERED_WATER"),
             (self.paint, "WEATHERED_PAINT"),
             (self.standing, "WEATHERED_STANDING"),
+            (self.marks, "WEATHERED_MARKS"),
+            (self.played_map, "WEATHERED_PLAYED_MAP"),
             (self.surface_texture, "WEATHERED_SURFACE_TEXTURE"),
             (self.wet_color_texture, "WEATHERED_WET_COLOR_TEXTURE"),
         ];

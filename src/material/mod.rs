@@ -17,6 +17,7 @@ mod extension;
 pub mod film;
 mod key;
 pub mod models;
+mod played;
 mod porous;
 mod ranges;
 mod standing;
@@ -30,11 +31,13 @@ use bevy::render::RenderApp;
 use bevy::shader::load_shader_library;
 
 use crate::overlay::deposit::note_traces;
+use crate::wetting::gpu::PackWater;
 
-pub use clock::ClockBuffer;
+pub use clock::{ClockBuffer, GpuDryingPoint};
 pub use exchange::DryMaterial;
 pub use extension::{PorousExtension, PorousUniform, WeatheredMaterial};
 pub use key::{ModelKind, PorousKey};
+pub use played::{PlayedWetMap, Playing};
 pub use porous::{
     BaseBrdf, Coated, Grains, Pores, PorositySource, PorousMaterial, TextureMeaning, Tweaked, WetLook,
     WettingModel, WettingTextures,
@@ -50,7 +53,8 @@ impl Plugin for PorousMaterialPlugin {
     fn build(&self, app: &mut App) {
         app.register_type::<PorousMaterial>()
             .register_type::<WettingTextures>()
-            .register_type::<StandingWater>();
+            .register_type::<StandingWater>()
+            .register_type::<PlayedWetMap>();
         if app.get_sub_app(RenderApp).is_none() {
             return;
         }
@@ -63,7 +67,7 @@ impl Plugin for PorousMaterialPlugin {
         load_shader_library!(app, "../../shaders/common/water_film.wgsl");
         load_shader_library!(app, "../../shaders/common/flood.wgsl");
         load_shader_library!(app, "../../shaders/common/ripples.wgsl");
-        load_shader_library!(app, "../../shaders/common/held_water.wgsl");
+        load_shader_library!(app, "../../shaders/common/drying.wgsl");
         load_shader_library!(app, "../../shaders/common/wet_map.wgsl");
         load_shader_library!(app, "../../shaders/common/wet_surface.wgsl");
         load_shader_library!(app, "../../shaders/common/wet_layers.wgsl");
@@ -78,6 +82,8 @@ impl Plugin for PorousMaterialPlugin {
                     .chain()
                     // The first water is drawn in the frame in which it comes.
                     .after(note_traces)
+                    // A surface that gets room for its water is bound to it at once.
+                    .after(PackWater)
                     // What is added here is drawn in this frame.
                     .before(AssetEventSystems),
             );

@@ -3,6 +3,8 @@
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::wetting::evolve::Matter;
+
 /// How a surface takes up water and looks with it. On an entity with [`Weatherable`](crate::overlay::Weatherable);
 /// without it, the default is used. May be changed at any time.
 #[derive(Component, Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
@@ -17,8 +19,22 @@ pub struct PorousMaterial {
     pub brdf: BaseBrdf,
     /// Seconds from the first water in a texel until it looks wet; 0 is at once.
     pub t_fill: f32,
-    /// Water, in mm, at which a texel looks fully wet. What comes on top is a film.
+    /// Water, in mm, that the pores can take up: porosity times depth. What comes on top stays a film. 0 is glazed.
     pub capacity_mm: f32,
+    /// Absorbed water, in mm, at which the surface looks fully wet; no more than `capacity_mm` counts.
+    pub visible_mm: f32,
+    /// S, sorptivity, mm/√min: how fast a film is taken up. Brick 2, sandstone .8, concrete .15, asphalt .02.
+    pub sorptivity: f32,
+    /// θ_s, part of the matter's volume that is pores, above 0 to 1: the fewer, the wider a patch spreads.
+    pub pore_volume: f32,
+    /// Film, in mm, that does not run: .03 to .05 on smooth matter, .1 to .2 on rough.
+    pub retained_mm: f32,
+    /// How much longer the middle of a wet patch stays wet than its rim, in parts of the time `visible_mm` takes to dry.
+    pub rim_delay: f32,
+    /// Strength of the white salts that drying leaves behind, 0..=1.
+    pub efflorescence: f32,
+    /// Strength of the dark lines that drying leaves behind along the rims of wet patches, 0..=1.
+    pub tide_mark: f32,
     /// Part of the diffuse light that comes out at the back when soaked, 0..=1: cloth and paper. The dry part is
     /// `StandardMaterial::diffuse_transmission`.
     pub wet_translucency: f32,
@@ -33,8 +49,39 @@ impl Default for PorousMaterial {
             brdf: BaseBrdf::Ggx,
             t_fill: 0.4,
             capacity_mm: 0.05,
+            visible_mm: 0.05,
+            sorptivity: 2.0,
+            pore_volume: 0.3,
+            retained_mm: 0.1,
+            rim_delay: 1.0,
+            efflorescence: 0.0,
+            tide_mark: 0.0,
             wet_translucency: 0.0,
         }
+    }
+}
+
+impl PorousMaterial {
+    /// What its pores do with water.
+    pub fn matter(&self) -> Matter {
+        let limit = |value: f32, most: f32| f64::from(value.clamp(0.0, most));
+        Matter::new(limit(self.sorptivity, 1000.0), limit(self.capacity_mm, 1000.0))
+    }
+
+    /// Absorbed water that looks fully wet, mm: `visible_mm`, but no more than fits in; above 0.
+    pub fn seen_mm(&self) -> f64 {
+        let most = if self.capacity_mm > 0.0 { self.capacity_mm } else { 1000.0 };
+        f64::from(self.visible_mm.min(most).max(1e-5))
+    }
+
+    /// Demand of the weather, mm, that goes by in the middle of a wet patch before its pores dry.
+    pub fn reserve_mm(&self) -> f64 {
+        f64::from(self.rim_delay.max(0.0)) * self.seen_mm()
+    }
+
+    /// Whether drying leaves anything behind.
+    pub fn leaves_marks(&self) -> bool {
+        self.efflorescence > 0.0 || self.tide_mark > 0.0
     }
 }
 

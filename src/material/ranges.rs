@@ -33,7 +33,14 @@ impl PorousMaterial {
     pub fn validate(&self) -> Result<(), OutOfRange> {
         check(&[
             ("t_fill", self.t_fill, 0.0, 86_400.0),
-            ("capacity_mm", self.capacity_mm, 1e-6, 1000.0),
+            ("capacity_mm", self.capacity_mm, 0.0, 1000.0),
+            ("visible_mm", self.visible_mm, 1e-5, 1000.0),
+            ("sorptivity", self.sorptivity, 0.0, 1000.0),
+            ("pore_volume", self.pore_volume, 0.001, 1.0),
+            ("retained_mm", self.retained_mm, 0.0, 1000.0),
+            ("rim_delay", self.rim_delay, 0.0, 1000.0),
+            ("efflorescence", self.efflorescence, 0.0, 1.0),
+            ("tide_mark", self.tide_mark, 0.0, 1.0),
             ("wet_translucency", self.wet_translucency, 0.0, 1.0),
         ])?;
         self.model.validate()

@@ -4,7 +4,7 @@ use bevy::prelude::*;
 
 use super::models::lekner_dorf::{LiquidFilm, N_WATER};
 use super::{
-    BaseBrdf, Coated, Flood, PorositySource, PorousKey, PorousMaterial, PorousUniform, StandingWater,
+    BaseBrdf, Coated, Flood, PlayedWetMap, Playing, PorositySource, PorousKey, PorousMaterial, PorousUniform, StandingWater,
     TextureMeaning, WettingModel, WettingTextures,
 };
 use crate::overlay::{Overlays, SurfaceTraces, TexelAreas, Wrap};
@@ -30,6 +30,8 @@ impl PorousUniform {
     pub const FLAG_POROSITY_GLOSS: u32 = 1 << 8;
     /// [`Tweaked::metalness_from_specular`](super::Tweaked::metalness_from_specular).
     pub const FLAG_METALNESS_FROM_SPECULAR: u32 = 1 << 9;
+    /// [`Playing::Drying`].
+    pub const FLAG_MAP_DRIES: u32 = 1 << 10;
 }
 
 /// Everything about a surface that its constants depend on.
@@ -37,6 +39,9 @@ pub(super) struct SurfaceLook<'a> {
     pub(super) porous: PorousMaterial,
     pub(super) standing: Option<StandingWater>,
     pub(super) textures: &'a WettingTextures,
+    pub(super) played: Option<&'a PlayedWetMap>,
+    /// Ticks per second.
+    pub(super) hz: u32,
     pub(super) maps: &'a Overlays,
     pub(super) areas: &'a TexelAreas,
     pub(super) traces: SurfaceTraces,
@@ -51,6 +56,8 @@ impl SurfaceLook<'_> {
             paint: self.traces.paint,
             standing: self.standing.is_some_and(|water| water.flood != Flood::None),
             unlike_standard: solid || self.porous.brdf == BaseBrdf::BlinnPhong,
+            marks: self.traces.water && self.porous.leaves_marks(),
+            played_map: self.played.is_some(),
             surface_texture: self.textures.surface.is_some(),
             wet_color_texture: self.textures.wet_color.is_some(),
             model: (&self.porous.model).into(),
@@ -63,13 +70,17 @@ impl SurfaceLook<'_> {
         let standing = standing.unwrap_or_default();
         let flag = |set: bool, flag: u32| if set { flag } else { 0 };
         let texel_mm2 = areas.mean_mm2;
+        let matter = porous.matter();
         let mut uniform = PorousUniform {
             absorption_per_mm: Vec3::from_array(standing.absorption_per_mm).max(Vec3::ZERO),
             levelling_mm: standing.levelling_mm.max(1e-3),
             t_fill: porous.t_fill.max(0.0),
-            // 1 mm on 1 mm² is 1 µl.
-            capacity_nl: (porous.capacity_mm * texel_mm2 * 1000.0).max(1.0),
-            capacity_mm: porous.capacity_mm.max(1e-6),
+            capacity_mm: matter.capacity_mm as f32,
+            visible_mm: porous.seen_mm() as f32,
+            sorptivity_squared: matter.sorptivity_squared as f32,
+            reserve_mm: porous.reserve_mm() as f32,
+            efflorescence: unit(porous.efflorescence),
+            tide_mark: unit(porous.tide_mark),
             wet_translucency: porous.wet_translucency.clamp(0.0, 1.0),
             rain_mm_per_h: standing.rain_mm_per_h.max(0.0),
             ripple_cell: standing.ripple_cell.max(1e-3),
@@ -82,6 +93,12 @@ impl SurfaceLook<'_> {
             ..default()
         };
         set_model(&mut uniform, &porous.model);
+        if let Some(played) = self.played {
+            uniform.map_ticks = (played.seconds * self.hz as f32).max(1.0);
+            uniform.map_fill = unit(played.t_fill);
+            uniform.map_tick = played.from_tick;
+            uniform.flags |= flag(played.playing == Playing::Drying, PorousUniform::FLAG_MAP_DRIES);
+        }
         match standing.flood {
             Flood::None => {}
             Flood::Accumulation { cracks, puddles } => {

@@ -2,8 +2,8 @@
 
 use bevy::prelude::*;
 
-use super::kernel::{axis_coverage, axis_offset, blend_over, falloff, share, slope_color, stamp_alpha};
-use super::{Splat, SplatQueue, TexelState, Weatherable, Wrap};
+use super::kernel::{axis_offset, blend_over, falloff, slope_color, stamp_alpha};
+use super::{Splat, SplatQueue, Weatherable, Wrap};
 use crate::schedule::{WeatheringSystems, WeatheringTick};
 
 /// The maps of a surface in main memory. Rows from v = 0 on, `size` texels each.
@@ -19,8 +19,6 @@ pub struct CpuMaps {
     pub specular: Vec<[u8; 4]>,
     /// Slope along u and v (128 is flat), unused, coverage; premultiplied.
     pub normal: Vec<[u8; 4]>,
-    /// Water and time.
-    pub state: Vec<TexelState>,
 }
 
 impl CpuMaps {
@@ -34,7 +32,6 @@ impl CpuMaps {
             diffuse: vec![[0; 4]; texels],
             specular: vec![[0; 4]; texels],
             normal: vec![[0; 4]; texels],
-            state: vec![TexelState::default(); texels],
         }
     }
 
@@ -47,23 +44,11 @@ impl CpuMaps {
 
     fn paint_one(&mut self, splat: &Splat) {
         let axes = [splat.axis(0, self.size, self.wrap), splat.axis(1, self.size, self.wrap)];
-        let (size, wrap) = (self.size as i32, self.wrap);
-        let texels = |index: usize| {
-            let (first, last) = splat.span(index);
-            match wrap[index] {
-                Wrap::Repeat => (first, last.min(first + size - 1)),
-                Wrap::Clamp => (first.clamp(0, size - 1), last.clamp(0, size - 1)),
-            }
-        };
-        let (columns, rows) = (texels(0), texels(1));
-        for y in (rows.0..=rows.1).map(|y| y.rem_euclid(size)) {
-            let (row, row_offset) = (axis_coverage(axes[1], y), axis_offset(axes[1], y));
-            for x in (columns.0..=columns.1).map(|x| x.rem_euclid(size)) {
-                let offset = [axis_offset(axes[0], x), row_offset];
-                let texel = (y * size + x) as usize;
-                let water = share(splat.water_nl, axis_coverage(axes[0], x), row);
-                self.state[texel].add_water(water, splat.tick);
-                self.color_texel(texel, splat, offset);
+        for y in splat.texels(1, self.size, self.wrap) {
+            let row_offset = axis_offset(axes[1], y as i32);
+            for x in splat.texels(0, self.size, self.wrap) {
+                let offset = [axis_offset(axes[0], x as i32), row_offset];
+                self.color_texel((y * self.size + x) as usize, splat, offset);
             }
         }
     }
@@ -86,11 +71,6 @@ impl CpuMaps {
         over(&mut self.specular[texel], color, opacity);
         let slopes = [slope_color(splat.bump, offset[0]), slope_color(splat.bump, offset[1]), 255];
         over(&mut self.normal[texel], slopes, splat.bump_opacity);
-    }
-
-    /// All water in the map, nanolitres.
-    pub fn water_nl(&self) -> u64 {
-        self.state.iter().map(|texel| u64::from(texel.water_nl)).sum()
     }
 }
 
@@ -164,12 +144,10 @@ mod tests {
         let (mut corner, mut middle) = (maps(Wrap::Repeat), maps(Wrap::Repeat));
         corner.paint(&[splat([100, 30])]);
         middle.paint(&[splat([32 * 256 + 100, 32 * 256 + 30])]);
-        assert_eq!(corner.water_nl(), 41_887);
         for y in 0..64 {
             for x in 0..64 {
                 let here = y * 64 + x;
                 let there = (y + 32) % 64 * 64 + (x + 32) % 64;
-                assert_eq!(corner.state[here], middle.state[there]);
                 assert_eq!(corner.diffuse[here], middle.diffuse[there]);
                 assert_eq!(corner.specular[here], middle.specular[there]);
                 assert_eq!(corner.normal[here], middle.normal[there]);
@@ -178,48 +156,20 @@ mod tests {
     }
 
     #[test]
-    fn texels_out_of_reach_stay_zero_and_clamping_keeps_the_water() {
+    fn texels_out_of_reach_stay_zero() {
         for (wrap, center) in [(Wrap::Clamp, [0, 64 * 256 - 1]), (Wrap::Repeat, [4000, 9000])] {
             let mut maps = maps(wrap);
             maps.paint(&[splat(center)]);
-            assert_eq!(maps.water_nl(), 41_887);
             for texel in 0..64 * 64 {
                 let (x, y) = (texel % 64, texel / 64);
                 let reach =
                     |at: i32, center: i32, radius: i32| (at * 256 + 128 - center).abs() <= radius + 128;
                 if !reach(x, center[0], 5 * 256) || !reach(y, center[1], 3 * 256) {
                     let texel = texel as usize;
-                    assert_eq!(maps.state[texel], TexelState::default());
                     assert_eq!([maps.diffuse[texel], maps.specular[texel], maps.normal[texel]], [[0; 4]; 3]);
                 }
             }
         }
-    }
-
-    #[test]
-    fn hits_set_the_wet_time_of_their_texels_and_later_ones_leave_it() {
-        bevy::tasks::ComputeTaskPool::get_or_init(default);
-        let mut world = World::new();
-        let surface = world.spawn((maps(Wrap::Repeat), SplatQueue::default())).id();
-        let mut schedule = Schedule::default();
-        schedule.add_systems(paint_on_cpu);
-        let mut hit = |world: &mut World, center, tick| {
-            let mut queue = world.get_mut::<SplatQueue>(surface).unwrap();
-            queue.push(Splat { tick, ..splat(center) });
-            schedule.run(world);
-            assert!(world.get::<SplatQueue>(surface).unwrap().is_empty());
-        };
-        let texel =
-            |world: &World, x: usize, y: usize| world.get::<CpuMaps>(surface).unwrap().state[y * 64 + x];
-        hit(&mut world, [20 * 256, 20 * 256], 3);
-        let first = texel(&world, 20, 20);
-        assert_eq!(first.wet_since, 3);
-        assert_eq!(texel(&world, 40, 40), TexelState::default());
-        hit(&mut world, [20 * 256, 20 * 256], 8);
-        hit(&mut world, [40 * 256, 40 * 256], 9);
-        let second = texel(&world, 20, 20);
-        assert_eq!((second.wet_since, second.water_nl), (3, 2 * first.water_nl));
-        assert_eq!(texel(&world, 40, 40).wet_since, 9);
     }
 
     #[test]

@@ -8,12 +8,14 @@ use crate::clock::WeatheringClock;
 use crate::collision::{Impact, Impacts, SurfaceCollider};
 use crate::effect::{EffectTable, WeatherEffect};
 use crate::schedule::{WeatheringSystems, WeatheringTick};
+use crate::wetting::{Drop, DropQueue, SurfaceWater};
 
 /// Splats of a surface that nobody has painted yet, in the order of their impacts. A frame may hold any number of
 /// ticks: each adds its own; the painter empties it.
 #[derive(Component, Debug, Default)]
 pub struct SplatQueue {
     splats: Vec<Splat>,
+    /// What has ever been pushed.
     traces: SurfaceTraces,
 }
 
@@ -35,14 +37,8 @@ impl SplatQueue {
 
     /// Adds a splat behind the others.
     pub fn push(&mut self, splat: Splat) {
-        self.traces.water |= splat.water_nl > 0;
         self.traces.paint |= splat.diffuse >> 24 > 0 || splat.specular >> 24 > 0 || splat.bump_opacity > 0;
         self.splats.push(splat);
-    }
-
-    /// What has ever been pushed.
-    pub fn traces(&self) -> SurfaceTraces {
-        self.traces
     }
 
     /// Whether nothing waits.
@@ -90,7 +86,7 @@ impl Plugin for DepositPlugin {
 
 /// Measures the texels of a surface when it gets a collider or maps of another size. A scale that changes later is not
 /// followed: the water would be spread anew.
-pub(super) fn measure_texels(
+pub(crate) fn measure_texels(
     mut commands: Commands,
     changed: Query<
         (Entity, &Weatherable, &SurfaceCollider, &GlobalTransform),
@@ -105,9 +101,15 @@ pub(super) fn measure_texels(
 }
 
 /// Tells those who draw what has come.
-pub(crate) fn note_traces(mut surfaces: Query<(&SplatQueue, &mut SurfaceTraces), Changed<SplatQueue>>) {
-    for (queue, mut traces) in &mut surfaces {
-        traces.set_if_neq(queue.traces());
+pub(crate) fn note_traces(
+    mut surfaces: Query<
+        (&SplatQueue, Option<&SurfaceWater>, &mut SurfaceTraces),
+        Or<(Changed<SplatQueue>, Changed<SurfaceWater>)>,
+    >,
+) {
+    for (queue, water, mut traces) in &mut surfaces {
+        let water = traces.water || water.is_some_and(SurfaceWater::is_wet);
+        traces.set_if_neq(SurfaceTraces { water, ..queue.traces });
     }
 }
 
@@ -116,14 +118,20 @@ pub fn deposit_splats(
     clock: Res<WeatheringClock>,
     impacts: Res<Impacts>,
     effects: Res<EffectTable>,
-    mut surfaces: Query<(&Weatherable, &mut SplatQueue, &mut SurfaceTotals)>,
+    mut surfaces: Query<(&Weatherable, &mut SplatQueue, &mut SurfaceTotals, Option<&mut DropQueue>)>,
 ) {
     for impact in &impacts.0 {
-        let Ok((surface, mut queue, mut totals)) = surfaces.get_mut(impact.surface) else { continue };
+        let Ok((surface, mut queue, mut totals, drops)) = surfaces.get_mut(impact.surface) else { continue };
         let Some(effect) = effects.get(impact.effect) else { continue };
         totals.impacts += 1;
         totals.water_nl += u64::from(impact.volume_nl);
-        queue.push(splat_from_impact(impact, effect, surface, clock.tick()));
+        let splat = splat_from_impact(impact, effect, surface, clock.tick());
+        queue.push(splat);
+        if let Some(mut drops) = drops
+            && splat.water_nl > 0
+        {
+            drops.0.push(Drop { center: splat.center, radius: splat.radius, water_nl: splat.water_nl });
+        }
     }
 }
 

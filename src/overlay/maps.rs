@@ -1,4 +1,4 @@
-//! What a texel holds, and how much surface it stands for.
+//! How much surface a texel stands for, and what falls on it.
 
 use bevy::math::Affine3A;
 use bevy::prelude::*;
@@ -6,26 +6,6 @@ use bytemuck::{Pod, Zeroable};
 
 use super::Wrap;
 use crate::collision::MeshTriangles;
-
-/// State of one texel. A row of the GPU's state buffer.
-#[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
-pub struct TexelState {
-    /// Water, nanolitres; stops at `u32::MAX` (4.29 l).
-    pub water_nl: u32,
-    /// Tick in which it became wet, 0 if it never did.
-    pub wet_since: u32,
-}
-
-impl TexelState {
-    /// Adds water that arrives in `tick`. What is wet already stays wet since when it was.
-    pub fn add_water(&mut self, water_nl: u32, tick: u32) {
-        if water_nl > 0 && self.water_nl == 0 {
-            self.wet_since = tick;
-        }
-        self.water_nl = self.water_nl.saturating_add(water_nl);
-    }
-}
 
 /// A drop that fell not long ago, for the ring around it. A row of the GPU's ring buffer; each tile of the map remembers
 /// its last [`Self::PER_TILE`], the newest first.
@@ -106,45 +86,35 @@ impl TexelAreas {
         let used = mm2.iter().filter(|&&area| area > 0.0).count().max(1);
         Self { mm2, total_mm2, mean_mm2: (total_mm2 / used as f64) as f32 }
     }
-
-    /// The part of the surface's area, 0..=1, on which `states` hold any water.
-    pub fn wet_fraction(&self, states: &[TexelState]) -> f64 {
-        let wet: f64 = self
-            .mm2
-            .iter()
-            .zip(states)
-            .filter(|(_, state)| state.water_nl > 0)
-            .map(|(&area, _)| f64::from(area))
-            // Not `sum`, whose nothing is -0.
-            .fold(0.0, |sum, area| sum + area);
-        if self.total_mm2 > 0.0 { wet / self.total_mm2 } else { 0.0 }
-    }
 }
 
 /// A triangle in the plane of the map, in texels, counter-clockwise.
-struct Footprint([Vec2; 3]);
+pub(crate) struct Footprint([Vec2; 3]);
 
 impl Footprint {
-    fn new([a, b, c]: [Vec2; 3]) -> Self {
+    pub(crate) fn new([a, b, c]: [Vec2; 3]) -> Self {
         Self(if (b - a).perp_dot(c - a) < 0.0 { [a, c, b] } else { [a, b, c] })
     }
 
-    fn bounds(&self) -> (Vec2, Vec2) {
+    pub(crate) fn bounds(&self) -> (Vec2, Vec2) {
         let [a, b, c] = self.0;
         (a.min(b).min(c), a.max(b).max(c))
     }
 
-    fn area(&self) -> f32 {
+    pub(crate) fn area(&self) -> f32 {
         let [a, b, c] = self.0;
         (b - a).perp_dot(c - a) * 0.5
     }
 
     /// Whether a point lies inside; one on an edge lies in one of the two triangles that share it.
-    fn covers(&self, point: Vec2) -> bool {
+    pub(crate) fn covers(&self, point: Vec2) -> bool {
         let [a, b, c] = self.0;
         [(a, b), (b, c), (c, a)].into_iter().all(|(from, to)| {
             let edge = to - from;
-            let side = edge.perp_dot(point - from);
+            // Measured from the same end for both triangles of an edge: if they rounded differently, a point on it
+            // might lie in neither.
+            let forward = edge.x > 0.0 || (edge.x == 0.0 && edge.y > 0.0);
+            let side = if forward { edge.perp_dot(point - from) } else { edge.perp_dot(point - to) };
             side > 0.0 || (side == 0.0 && (edge.y > 0.0 || (edge.y == 0.0 && edge.x < 0.0)))
         })
     }
@@ -205,23 +175,5 @@ mod tests {
         let plain = TexelAreas::new(&quad(0.5), &Affine3A::IDENTITY, 64, REPEAT);
         let scaled = TexelAreas::new(&quad(0.5), &doubled, 64, REPEAT);
         assert!((scaled.total_mm2 / plain.total_mm2 - 6.0).abs() < 1e-3);
-    }
-
-    #[test]
-    fn wet_fraction_is_by_area() {
-        let areas = TexelAreas { mm2: vec![1.0, 3.0, 0.0, 4.0], total_mm2: 8.0, mean_mm2: 2.0 };
-        let wet = TexelState { water_nl: 5, wet_since: 1 };
-        let dry = TexelState::default();
-        assert_eq!(areas.wet_fraction(&[wet, dry, wet, dry]), 0.125);
-    }
-
-    #[test]
-    fn water_keeps_its_first_hour_and_stops_at_the_brim() {
-        let mut texel = TexelState::default();
-        texel.add_water(0, 3);
-        assert_eq!(texel, TexelState::default());
-        texel.add_water(5, 4);
-        texel.add_water(u32::MAX, 9);
-        assert_eq!(texel, TexelState { water_nl: u32::MAX, wet_since: 4 });
     }
 }

@@ -1,8 +1,8 @@
 //! The maps of a surface, and painting impacts into them.
 //!
 //! Every [`Weatherable`] mesh gets overlay maps over its uv square: three colour maps that lie over its material's
-//! own (diffuse, specular, normal) and the [state](TexelState) of each texel: how much water it holds and since
-//! when. An impact becomes a [`Splat`] ([`deposit`]), and splats are painted in the order of their impacts.
+//! own: diffuse, specular, normal. An impact becomes a [`Splat`] ([`deposit`]), and splats are painted in the order of their
+//! impacts. Their water goes another way, to [`wetting`](crate::wetting).
 //!
 //! Two painters do the same arithmetic, in integers, so that they agree to the bit: a compute pass
 //! ([`GpuOverlayPlugin`]) that sorts splats into tiles and visits each touched texel once, and a plain loop over
@@ -11,8 +11,7 @@
 //!
 //! # Wraparound
 //! A stamp over the edge of the map continues at the opposite edge ([`Wrap::Repeat`]) or ends there
-//! ([`Wrap::Clamp`]: the water that would lie beyond stays in the edge texels). Either way every nanolitre of an
-//! impact ends up in the map.
+//! ([`Wrap::Clamp`]).
 
 mod cpu;
 pub mod deposit;
@@ -28,7 +27,9 @@ use serde::{Deserialize, Serialize};
 pub use cpu::{CpuMaps, CpuOverlayPlugin};
 pub use deposit::{DepositPlugin, SplatQueue, SurfaceTotals, SurfaceTraces, deposit_splats};
 pub use gpu::{GpuOverlayPlugin, Overlays, SplatStats, SurfaceBatch};
-pub use maps::{RainRing, TexelAreas, TexelState};
+pub(crate) use deposit::measure_texels;
+pub(crate) use maps::Footprint;
+pub use maps::{RainRing, TexelAreas};
 pub use splat::Splat;
 pub use tiles::{TILE_SIZE, TileBins, TileHeader};
 

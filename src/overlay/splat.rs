@@ -68,6 +68,17 @@ impl Splat {
         }
     }
 
+    /// The texels the stamp touches along an axis, each once, brought into the map.
+    pub fn texels(&self, index: usize, size: u32, wrap: [Wrap; 2]) -> impl Iterator<Item = u32> + use<> {
+        let side = size as i32;
+        let (first, last) = self.span(index);
+        let (first, last) = match wrap[index] {
+            Wrap::Repeat => (first, last.min(first + side - 1)),
+            Wrap::Clamp => (first.clamp(0, side - 1), last.clamp(0, side - 1)),
+        };
+        (first..=last).map(move |texel| texel.rem_euclid(side) as u32)
+    }
+
     /// First and last texel the stamp touches along an axis, before wrapping or clamping.
     pub fn span(&self, index: usize) -> (i32, i32) {
         let (center, radius) = (self.center[index], self.radius[index]);

@@ -6,6 +6,7 @@ use bevy::prelude::*;
 use super::{Forces, Lifespan, Position, Velocity};
 use crate::clock::WeatheringClock;
 use crate::effect::{EffectIndex, EffectTable};
+use crate::weather::Weather;
 
 /// Numbers of an effect that motion needs: a scratch row of [`integrate_particles`].
 #[derive(Debug, Clone, Copy, Default)]
@@ -46,6 +47,7 @@ type MovingItem<'w, 's> = QueryItem<'w, 's, Moving>;
 pub fn integrate_particles(
     clock: Res<WeatheringClock>,
     forces: Res<Forces>,
+    weather: Res<Weather>,
     effects: Res<EffectTable>,
     mut motions: Local<Vec<Motion>>,
     mut particles: Query<Moving>,
@@ -55,7 +57,7 @@ pub fn integrate_particles(
         Some(effect) => Motion::new(&forces, effect.gravity_scale, effect.terminal_speed),
         None => Motion::default(),
     }));
-    let (motions, wind, tick) = (motions.as_slice(), forces.wind, clock.delta_secs());
+    let (motions, wind, tick) = (motions.as_slice(), weather.wind, clock.delta_secs());
     let step = |(mut position, mut velocity, mut lifespan, effect): MovingItem| {
         // Change detection is for people who look at single particles; nobody pays for it here.
         let position = position.bypass_change_detection();
@@ -82,6 +84,7 @@ mod tests {
         let mut world = World::new();
         world.insert_resource(WeatheringClock::new(60));
         world.insert_resource(forces);
+        world.init_resource::<Weather>();
         let mut table = EffectTable::default();
         let index = table.insert(Handle::default(), effect).unwrap();
         world.insert_resource(table);
@@ -114,7 +117,8 @@ mod tests {
     #[test]
     fn without_drag_it_keeps_the_wind_out_and_falls_freely() {
         let effect = WeatherEffect { terminal_speed: 0.0, ..default() };
-        let (mut world, index) = world_with(effect, Forces { wind: Vec3::X * 50.0, ..default() });
+        let (mut world, index) = world_with(effect, Forces::default());
+        world.resource_mut::<Weather>().wind = Vec3::X * 50.0;
         let stone = world.spawn(particle(Vec3::ZERO, index, 0)).id();
         run(&mut world, 60);
         let velocity = world.get::<Velocity>(stone).unwrap().0;
@@ -124,7 +128,8 @@ mod tests {
     #[test]
     fn a_storm_carries_light_particles_with_it() {
         let effect = WeatherEffect { terminal_speed: 0.05, ..default() };
-        let (mut world, index) = world_with(effect, Forces { wind: Vec3::X * 30.0, ..default() });
+        let (mut world, index) = world_with(effect, Forces::default());
+        world.resource_mut::<Weather>().wind = Vec3::X * 30.0;
         let dust = world.spawn(particle(Vec3::ZERO, index, 0)).id();
         run(&mut world, 120);
         let velocity = world.get::<Velocity>(dust).unwrap().0;

@@ -21,6 +21,7 @@ mod retire;
 use bevy::prelude::*;
 
 use crate::effect::EffectIndex;
+use crate::weather::Weather;
 use crate::schedule::{RetireParticles, WeatheringSystems, WeatheringTick};
 
 pub use draw::{ParticleDrawPlugin, ParticleMesh};
@@ -96,19 +97,17 @@ pub fn swept_start(position: Vec3, velocity: Vec3, seconds_moved: f32) -> Vec3 {
     position - velocity * (seconds_moved * 1.0001)
 }
 
-/// Gravity and wind, the same everywhere.
+/// Gravity, the same everywhere. The wind is the [`Weather`]'s.
 #[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Resource)]
 pub struct Forces {
     /// m/s².
     pub gravity: Vec3,
-    /// m/s.
-    pub wind: Vec3,
 }
 
 impl Default for Forces {
     fn default() -> Self {
-        Self { gravity: Vec3::new(0.0, -9.81, 0.0), wind: Vec3::ZERO }
+        Self { gravity: Vec3::new(0.0, -9.81, 0.0) }
     }
 }
 
@@ -126,6 +125,26 @@ pub struct ParticleCounts {
     pub expired: u64,
     /// Particles not spawned because [`ParticleConfig::max_alive`] was reached; not part of `emitted`.
     pub refused: u64,
+}
+
+/// The water of all particles so far, nanolitres. `emitted` and what surfaces dripped is what they received, what expired,
+/// and what is still in flight.
+#[derive(Resource, Debug, Default, Clone, PartialEq, Eq)]
+pub struct WaterCounts {
+    /// Sent out by emitters.
+    pub emitted_nl: u64,
+    /// Carried by particles whose lifetime ran out, by [`EffectIndex`].
+    pub expired_nl: Vec<u64>,
+}
+
+impl WaterCounts {
+    fn expire(&mut self, effect: EffectIndex, volume: Volume) {
+        let row = usize::from(effect.0);
+        if self.expired_nl.len() <= row {
+            self.expired_nl.resize(row + 1, 0);
+        }
+        self.expired_nl[row] += u64::from(volume.0);
+    }
 }
 
 /// Limits on particles.
@@ -149,8 +168,10 @@ impl Plugin for ParticlePlugin {
     fn build(&self, app: &mut App) {
         app.register_type::<Forces>()
             .init_resource::<Forces>()
+            .init_resource::<Weather>()
             .init_resource::<ParticleConfig>()
             .init_resource::<ParticleCounts>()
+            .init_resource::<WaterCounts>()
             .init_resource::<Retired>()
             .add_systems(
                 WeatheringTick,

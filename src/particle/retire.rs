@@ -2,7 +2,8 @@
 
 use bevy::prelude::*;
 
-use super::{Lifespan, ParticleCounts, Sequence};
+use super::{Lifespan, ParticleCounts, Sequence, Volume, WaterCounts};
+use crate::effect::EffectIndex;
 
 /// Particles that died in this tick; a buffer that keeps its capacity. Empty between ticks.
 #[derive(Resource, Debug, Default)]
@@ -12,13 +13,21 @@ pub struct Retired {
 }
 
 /// Finds the particles that hit a surface or whose time ran out, and ends the first tick of the newly born.
-pub fn collect_dead(mut retired: ResMut<Retired>, mut particles: Query<(Entity, &mut Lifespan, &Sequence)>) {
+pub fn collect_dead(
+    mut retired: ResMut<Retired>,
+    mut water: ResMut<WaterCounts>,
+    mut particles: Query<(Entity, &mut Lifespan, &Sequence, &Volume, &EffectIndex)>,
+) {
     let Retired { particles: dead, hit } = &mut *retired;
-    for (entity, mut lifespan, &sequence) in &mut particles {
+    for (entity, mut lifespan, &sequence, &volume, &effect) in &mut particles {
         let lifespan = lifespan.bypass_change_detection();
         if lifespan.is_over() {
             dead.push((sequence, entity));
-            *hit += u64::from(lifespan.has_hit());
+            if lifespan.has_hit() {
+                *hit += 1;
+            } else {
+                water.expire(effect, volume);
+            }
         }
         lifespan.born_at = 0;
     }
@@ -51,10 +60,11 @@ mod tests {
     fn the_dead_go_and_are_counted_by_cause() {
         let mut world = World::new();
         world.init_resource::<Retired>();
+        world.init_resource::<WaterCounts>();
         world.insert_resource(ParticleCounts { emitted: 4, alive: 4, ..default() });
         let mut spawn = |ticks_left, number| {
             let life = Lifespan { ticks_left, born_at: 77 };
-            world.spawn((life, Sequence(number))).id()
+            world.spawn((life, Sequence(number), Volume(10 + number), EffectIndex(1))).id()
         };
         let alive = spawn(3, 0);
         let expired = spawn(0, 1);
@@ -73,5 +83,6 @@ mod tests {
         assert!(world.get_entity(also_alive).is_ok());
         let expected = ParticleCounts { emitted: 4, alive: 2, hit: 1, expired: 1, refused: 0 };
         assert_eq!(*world.resource::<ParticleCounts>(), expected);
+        assert_eq!(world.resource::<WaterCounts>().expired_nl, [0, 11]);
     }
 }

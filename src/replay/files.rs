@@ -69,8 +69,8 @@ mod tests {
             "report.json",
             "frame_00000.png",
             "frame_123456.png",
-            "maps/a_b_water.png",
-            "maps/a_wet_since.png",
+            "maps/a_b_film.png",
+            "maps/a_since.png",
         ];
         let others = ["frame_1.png", "frame_abcde.png", "notes.txt", "maps/mine.png"];
         for name in ours.iter().chain(&others) {

@@ -10,11 +10,15 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
 use super::{ReplayError, Run, give_up_after, write_atomic};
 use crate::clock::WeatheringClock;
-use crate::overlay::{CpuMaps, Overlays, SplatStats, SurfaceTotals, TexelAreas, TexelState, Weatherable};
+use crate::material::PorousMaterial;
+use crate::overlay::{CpuMaps, Overlays, SplatStats, SurfaceTotals, Weatherable};
 use crate::scenario::ScenarioSurface;
+use crate::weather::DryingClock;
+use crate::wetting::query::{summary, wetness_of};
+use crate::wetting::{Exposure, Now, Stock, SurfaceWater, WetGeometry, Wetness};
 
 /// All maps of one surface.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct SurfaceMaps {
     /// The surface's name in the scenario.
     pub name: String,
@@ -26,11 +30,17 @@ pub struct SurfaceMaps {
     pub specular: Vec<u8>,
     /// Slope along u and v, unused, coverage; premultiplied.
     pub normal: Vec<u8>,
-    /// Water and time.
-    pub state: Vec<TexelState>,
-    /// Mean area of a texel, mm².
-    pub texel_mm2: f32,
-    /// Ticks per second of [`TexelState::wet_since`].
+    /// How wet each texel is at the end, row by row.
+    pub wetness: Vec<Wetness>,
+    /// Reference tick of each texel, row by row; empty while it has never been wet.
+    pub since: Vec<u32>,
+    /// Part of its area that looks wet.
+    pub wet_fraction: f64,
+    /// All its water.
+    pub water: SurfaceWater,
+    /// Where that water is.
+    pub stock: Stock,
+    /// Ticks per second of `since`.
     pub hz: u32,
 }
 
@@ -44,39 +54,41 @@ impl Run<'_> {
         if self.options.render {
             self.finish_painting()?;
         }
-        let hz = self.app.world().resource::<WeatheringClock>().hz();
+        let clock = *self.app.world().resource::<WeatheringClock>();
+        let drying = self.app.world().resource::<DryingClock>().clone();
         let world = self.app.world_mut();
         let mut query = world.query::<(
-            Entity,
-            &ScenarioSurface,
-            &Weatherable,
-            &TexelAreas,
-            Option<&CpuMaps>,
-            Option<&Overlays>,
+            (Entity, &ScenarioSurface, &Weatherable, &SurfaceWater, &WetGeometry),
+            (Option<&Exposure>, Option<&PorousMaterial>, Option<&CpuMaps>, Option<&Overlays>),
         )>();
         let mut surfaces = Vec::new();
         let mut requests = Vec::new();
-        for (entity, surface, maps, areas, cpu, gpu) in query.iter(world) {
+        let default = PorousMaterial::default();
+        for ((entity, surface, maps, water, geometry), (exposure, material, cpu, gpu)) in query.iter(world) {
+            let material = material.unwrap_or(&default);
+            let now = Now::new(clock.tick(), clock.hz(), &drying, &geometry.0, exposure, material);
+            let wetness = (0..maps.texels().pow(2)).map(|texel| wetness_of(water, &now, texel)).collect();
             let mut read = SurfaceMaps {
                 name: surface.name.clone(),
                 size: maps.texels(),
                 diffuse: vec![],
                 specular: vec![],
                 normal: vec![],
-                state: vec![],
-                texel_mm2: areas.mean_mm2,
-                hz,
+                wetness,
+                since: water.texels().iter().map(|texel| texel.tick).collect(),
+                wet_fraction: f64::from(summary(water, &now).wet_fraction),
+                water: water.clone(),
+                stock: water.stock(&now),
+                hz: clock.hz(),
             };
             if let Some(cpu) = cpu {
                 read.diffuse = cpu.diffuse.as_flattened().to_vec();
                 read.specular = cpu.specular.as_flattened().to_vec();
                 read.normal = cpu.normal.as_flattened().to_vec();
-                read.state = cpu.state.clone();
             } else if let Some(gpu) = gpu {
                 requests.push((entity, 0, Readback::texture(gpu.diffuse.clone())));
                 requests.push((entity, 1, Readback::texture(gpu.specular.clone())));
                 requests.push((entity, 2, Readback::texture(gpu.normal.clone())));
-                requests.push((entity, 3, Readback::buffer(gpu.state.clone())));
             }
             surfaces.push((surface.index, entity, read));
         }
@@ -88,8 +100,7 @@ impl Run<'_> {
             match map {
                 0 => read.diffuse = without_padding(&bytes, read.size),
                 1 => read.specular = without_padding(&bytes, read.size),
-                2 => read.normal = without_padding(&bytes, read.size),
-                _ => read.state = bytemuck::pod_collect_to_vec(&bytes),
+                _ => read.normal = without_padding(&bytes, read.size),
             }
         }
         Ok(surfaces.into_iter().map(|(_, _, maps)| maps).collect())
@@ -145,36 +156,34 @@ fn without_padding(bytes: &[u8], size: u32) -> Vec<u8> {
 }
 
 /// What is written of each surface.
-pub(super) const MAP_NAMES: [&str; 5] = ["diffuse", "specular", "normal", "water", "wet_since"];
+pub(super) const MAP_NAMES: [&str; 7] =
+    ["diffuse", "specular", "normal", "film", "absorbed", "wetness", "since"];
 
-/// Writes `<surface>_<map>.png` for each map: `diffuse`, `specular`, `normal` as they are, `water` as 16-bit
-/// micrometres of film, `wet_since` as 16-bit hundredths of a second (0 is dry). Values too large stop at 65,535.
+/// Writes `<surface>_<map>.png` for each map: `diffuse`, `specular`, `normal` as they are; `film` and `absorbed` as 16-bit
+/// micrometres of water, `wetness` as 16-bit parts of full, `since` as 16-bit hundredths of a second of the reference
+/// time (0 is never). Values too large stop at 65,535.
 pub(super) fn write_maps(folder: &Path, surfaces: &[SurfaceMaps]) -> Result<(), ReplayError> {
     for surface in surfaces {
         let path = |map| folder.join(format!("{}_{map}.png", surface.name));
-        let [diffuse, specular, normal, water, wet_since] = MAP_NAMES.map(path);
+        let [diffuse, specular, normal, film, absorbed, wetness, since] = MAP_NAMES.map(path);
         for (path, texels) in
             [(diffuse, &surface.diffuse), (specular, &surface.specular), (normal, &surface.normal)]
         {
             write_map(&path, texels, surface.size, ExtendedColorType::Rgba8)?;
         }
-        // 1 nl on 1 mm² is 1 µm.
-        let film = |texel: &TexelState| texel.water_nl as f32 / surface.texel_mm2;
-        write_grey(&water, surface, film)?;
-        let since = |texel: &TexelState| texel.wet_since as f32 * 100.0 / surface.hz as f32;
-        write_grey(&wet_since, surface, since)?;
+        let texels = || surface.wetness.iter();
+        write_grey(&film, surface.size, texels().map(|texel| texel.film_mm * 1000.0))?;
+        write_grey(&absorbed, surface.size, texels().map(|texel| texel.absorbed_mm * 1000.0))?;
+        write_grey(&wetness, surface.size, texels().map(|texel| texel.wetness * 65_535.0))?;
+        let ticks = (0..surface.wetness.len()).map(|texel| surface.since.get(texel).copied().unwrap_or(0));
+        write_grey(&since, surface.size, ticks.map(|tick| tick as f32 * 100.0 / surface.hz as f32))?;
     }
     Ok(())
 }
 
-fn write_grey(
-    path: &Path,
-    surface: &SurfaceMaps,
-    value: impl Fn(&TexelState) -> f32,
-) -> Result<(), ReplayError> {
-    let texels: Vec<u16> =
-        surface.state.iter().map(|texel| value(texel).round().clamp(0.0, 65_535.0) as u16).collect();
-    write_map(path, bytemuck::cast_slice(&texels), surface.size, ExtendedColorType::L16)
+fn write_grey(path: &Path, size: u32, values: impl Iterator<Item = f32>) -> Result<(), ReplayError> {
+    let texels: Vec<u16> = values.map(|value| value.round().clamp(0.0, 65_535.0) as u16).collect();
+    write_map(path, bytemuck::cast_slice(&texels), size, ExtendedColorType::L16)
 }
 
 fn write_map(path: &Path, bytes: &[u8], size: u32, color: ExtendedColorType) -> Result<(), ReplayError> {

@@ -6,10 +6,11 @@ use serde::Serialize;
 use super::{ReplayOptions, SurfaceMaps};
 use crate::clock::WeatheringClock;
 use crate::collision::ColliderReport;
-use crate::emitter::EmissionSeed;
-use crate::overlay::{SurfaceTotals, TexelAreas};
-use crate::particle::ParticleCounts;
+use crate::emitter::{EmissionSeed, NewParticles};
+use crate::overlay::SurfaceTotals;
+use crate::particle::{ParticleCounts, Volume, WaterCounts};
 use crate::scenario::{Digest, ScenarioSurface, amounts_digest};
+use crate::wetting::DripEffect;
 
 /// `report.json`.
 #[derive(Serialize, Debug, Clone)]
@@ -24,6 +25,8 @@ pub struct Report {
     pub seconds: f64,
     /// All particles.
     pub particles: ParticleReport,
+    /// All water.
+    pub water: WaterReport,
     /// In the order of the scenario.
     pub surfaces: Vec<SurfaceReport>,
     /// Hash over all impacts and all amounts; see [`amounts_digest`].
@@ -56,12 +59,37 @@ pub struct SurfaceReport {
     pub triangles: u32,
     /// Particles that hit it.
     pub impacts: u64,
-    /// Water in its map, mm³.
-    pub water_mm3: f64,
-    /// Water that the particles carried, mm³; the same unless a texel overflowed.
+    /// Water that the particles carried, mm³.
     pub received_mm3: f64,
-    /// Part of its area with any water, 0..=1.
+    /// Film on it, mm³.
+    pub film_mm3: f64,
+    /// Absorbed, mm³.
+    pub absorbed_mm3: f64,
+    /// Gone into the air, mm³.
+    pub evaporated_mm3: f64,
+    /// Left it as drips, mm³.
+    pub dripped_mm3: f64,
+    /// Part of its area that looks wet, 0..=1.
     pub wet_fraction: f64,
+}
+
+/// Where all the water is, mm³: `emitted = on_surfaces + evaporated + run_off + missed + in_flight`, in whole nanolitres.
+#[derive(Serialize, Debug, Clone, Copy, PartialEq)]
+pub struct WaterReport {
+    /// Sent out by emitters.
+    pub emitted_mm3: f64,
+    /// Film and absorbed.
+    pub on_surfaces_mm3: f64,
+    /// Gone into the air.
+    pub evaporated_mm3: f64,
+    /// Dripped off and hit nothing more, or more than a texel can hold.
+    pub run_off_mm3: f64,
+    /// Sent out and hit nothing.
+    pub missed_mm3: f64,
+    /// Still in flight.
+    pub in_flight_mm3: f64,
+    /// What the sum differs by, in parts of what was emitted.
+    pub imbalance: f64,
 }
 
 /// Where the time went.
@@ -84,24 +112,28 @@ pub(super) fn report(
     maps: &[SurfaceMaps],
     timing: Timing,
 ) -> Report {
-    let mut query = world.query::<(&ScenarioSurface, &SurfaceTotals, &TexelAreas, &ColliderReport)>();
+    let mut query = world.query::<(&ScenarioSurface, &SurfaceTotals, &ColliderReport)>();
     let mut surfaces: Vec<_> = query
         .iter(world)
-        .map(|(surface, totals, areas, collider)| {
-            let state = maps.get(surface.index as usize).map_or(&[][..], |maps| &maps.state);
-            let water_nl: u64 = state.iter().map(|texel| u64::from(texel.water_nl)).sum();
+        .filter_map(|(surface, totals, collider)| {
+            let maps = maps.get(surface.index as usize)?;
+            let mm3 = |units| maps.water.units().mm3(units);
             let row = SurfaceReport {
                 name: surface.name.clone(),
                 triangles: collider.0.total,
                 impacts: totals.impacts,
-                water_mm3: water_nl as f64 / 1000.0,
                 received_mm3: totals.water_nl as f64 / 1000.0,
-                wet_fraction: areas.wet_fraction(state),
+                film_mm3: mm3(maps.stock.film),
+                absorbed_mm3: mm3(maps.stock.pores),
+                evaporated_mm3: mm3(maps.stock.evaporated),
+                dripped_mm3: mm3(maps.water.ledger().dripped),
+                wet_fraction: maps.wet_fraction,
             };
-            (surface.index, row)
+            Some((surface.index, row))
         })
         .collect();
     surfaces.sort_by_key(|(index, _)| *index);
+    let water = water_report(world, maps);
 
     let clock = *world.resource::<WeatheringClock>();
     let counts = *world.resource::<ParticleCounts>();
@@ -118,8 +150,43 @@ pub(super) fn report(
             expired: counts.expired,
             refused: counts.refused,
         },
+        water,
         surfaces: surfaces.into_iter().map(|(_, row)| row).collect(),
-        digest: amounts_digest(digest, maps.iter().map(|maps| maps.state.as_slice())),
+        digest: amounts_digest(digest, maps.iter().map(|maps| &maps.water)),
         timing,
     }
+}
+
+/// Adds up all water, wherever it is.
+fn water_report(world: &mut World, maps: &[SurfaceMaps]) -> WaterReport {
+    let nl = |nl: u64| nl as f64 / 1000.0;
+    let sum = |of: &dyn Fn(&SurfaceMaps) -> u64| -> f64 {
+        maps.iter().map(|maps| maps.water.units().mm3(of(maps))).sum::<f64>() + 0.0
+    };
+    let flying: u64 = world.query::<&Volume>().iter(world).map(|volume| u64::from(volume.0)).sum();
+    let in_flight = flying + world.resource::<NewParticles>().waiting_nl();
+    let counts = world.resource::<WaterCounts>();
+    let drips = world.get_resource::<DripEffect>().and_then(|drips| drips.index).map(|index| index.0);
+    let expired = |dripped: bool| -> u64 {
+        let rows = counts.expired_nl.iter().enumerate();
+        rows.filter(|(row, _)| (drips.map(usize::from) == Some(*row)) == dripped).map(|(_, nl)| nl).sum()
+    };
+    let mut report = WaterReport {
+        emitted_mm3: nl(counts.emitted_nl),
+        on_surfaces_mm3: sum(&|maps| maps.stock.film + maps.stock.pores),
+        evaporated_mm3: sum(&|maps| maps.stock.evaporated),
+        run_off_mm3: nl(expired(true)) + sum(&|maps| maps.water.ledger().spilled),
+        missed_mm3: nl(expired(false)),
+        in_flight_mm3: nl(in_flight),
+        imbalance: 0.0,
+    };
+    let found = report.on_surfaces_mm3
+        + report.evaporated_mm3
+        + report.run_off_mm3
+        + report.missed_mm3
+        + report.in_flight_mm3;
+    if report.emitted_mm3 > 0.0 {
+        report.imbalance = (report.emitted_mm3 - found) / report.emitted_mm3;
+    }
+    report
 }

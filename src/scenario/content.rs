@@ -24,6 +24,8 @@ pub(super) struct Content {
     pub(super) meshes: Vec<Option<Mesh>>,
     /// In the order of the materials; empty without a renderer.
     pub(super) materials: Vec<MaterialMaps>,
+    /// Played wet maps, in the order of the surfaces; empty without a renderer.
+    pub(super) wet_maps: Vec<Option<Image>>,
     /// `None` without a renderer.
     pub(super) environment: Option<EnvironmentMaps>,
 }
@@ -58,7 +60,13 @@ impl LoadedScenario {
         }
         let mut materials = Vec::new();
         let mut environment = None;
+        let mut wet_maps = Vec::new();
         if looks {
+            for (index, surface) in scenario.surfaces.iter().enumerate() {
+                let field = format!("surfaces[{index}].wet_map.map");
+                let map = surface.wet_map.as_ref().map(|map| self.photo(&field, &map.map, false));
+                wet_maps.push(map.transpose()?);
+            }
             // Growing a stone takes a second; each has a thread.
             materials = std::thread::scope(|threads| {
                 let growing: Vec<_> = scenario
@@ -91,7 +99,7 @@ impl LoadedScenario {
                     Some(environment_maps_from_equirect(width, height, &pixels, settings).map_err(unusable)?);
             }
         }
-        Ok(Content { effects, meshes, materials, environment })
+        Ok(Content { effects, meshes, materials, wet_maps, environment })
     }
 
     fn material_maps(&self, field: &str, material: &MaterialSpec) -> Result<MaterialMaps, ScenarioError> {

@@ -3,29 +3,32 @@
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 
+use super::ScenarioSurface;
 use crate::clock::WeatheringClock;
 use crate::collision::Impacts;
-use crate::overlay::TexelState;
-
-use super::ScenarioSurface;
+use crate::wetting::SurfaceWater;
 
 /// Hash over all impacts so far: tick, particle, surface, triangle, uv, water. Needs no renderer.
-#[derive(Resource, Default, Clone)]
-pub struct Digest(blake3::Hasher);
+///
+/// A chain: each tick's hash is over the one before and what happened in it. So it can be kept and gone on with.
+#[derive(Resource, Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub struct Digest(pub [u8; 32]);
 
 impl Digest {
     /// The hash, 64 hexadecimal digits.
     pub fn to_hex(&self) -> String {
-        self.0.finalize().to_hex().to_string()
+        blake3::Hash::from_bytes(self.0).to_hex().to_string()
     }
 }
 
-/// Hash over the impacts and over all texels of all surfaces, in the order of the scenario. The texels are integers that
-/// GPU and CPU agree on, so this too is the same with and without a renderer.
-pub fn amounts_digest<'a>(impacts: &Digest, surfaces: impl IntoIterator<Item = &'a [TexelState]>) -> String {
-    let mut hasher = impacts.0.clone();
-    for texels in surfaces {
-        hasher.update(bytemuck::cast_slice(texels));
+/// Hash over the impacts and over the water of all surfaces, in the order of the scenario: the same with and without a
+/// renderer.
+pub fn amounts_digest<'a>(impacts: &Digest, surfaces: impl IntoIterator<Item = &'a SurfaceWater>) -> String {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(&impacts.0);
+    for water in surfaces {
+        hasher.update(bytemuck::cast_slice(water.texels()));
+        hasher.update(bytemuck::cast_slice(water.marks()));
     }
     hasher.finalize().to_hex().to_string()
 }
@@ -38,12 +41,18 @@ pub(super) fn digest_impacts(
     mut digest: ResMut<Digest>,
     mut numbers: Local<HashMap<Entity, u32>>,
 ) {
+    if impacts.0.is_empty() {
+        return;
+    }
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(&digest.0);
     for impact in &impacts.0 {
         let number = *numbers
             .entry(impact.surface)
             .or_insert_with(|| surfaces.get(impact.surface).map_or(u32::MAX, |surface| surface.index));
         let [u, v] = impact.uv.to_array().map(f32::to_bits);
         let row = [clock.tick(), impact.sequence.0, number, impact.triangle, u, v, impact.volume_nl];
-        digest.0.update(bytemuck::cast_slice(&row));
+        hasher.update(bytemuck::cast_slice(&row));
     }
+    digest.0 = *hasher.finalize().as_bytes();
 }

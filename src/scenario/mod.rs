@@ -26,6 +26,6 @@ pub use motion::ScenarioCamera;
 pub use reset::reset_scenario;
 pub use schema::{
     CameraKey, CameraSpec, EmitterKey, EmitterSpec, EnvironmentSpec, MaterialSpec, MeshSpec, Scenario,
-    SunSpec, SurfaceSpec, SurfaceTextureSpec, TextureSpec,
+    SunSpec, SurfaceSpec, SurfaceTextureSpec, TextureSpec, WeatherSpec, WetMapSpec,
 };
 pub use spawn::{ScenarioPlugin, ScenarioStatus, ScenarioSurface};

@@ -9,6 +9,7 @@ use crate::emitter::EmitterShape;
 use crate::material::{PorousMaterial, StandingWater};
 use crate::overlay::Weatherable;
 use crate::scenes::stone::Stone;
+use crate::weather::Weather;
 
 /// A scene and what happens in it. Lengths in metres, angles in degrees, time in seconds.
 #[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
@@ -28,6 +29,9 @@ pub struct Scenario {
     /// m/s.
     #[serde(default)]
     pub wind: Vec3,
+    /// What dries. The wind is `wind`, the direction of the sun that of `sun`.
+    #[serde(default)]
+    pub weather: WeatherSpec,
     /// The most particles in flight, up to [`Self::MAX_PARTICLES`].
     #[serde(default = "default_max_particles")]
     pub max_particles: u32,
@@ -130,6 +134,36 @@ impl Default for SunSpec {
             color: [1.0, 0.95, 0.88],
             shadows: true,
         }
+    }
+}
+
+/// What the weather takes; see [`Weather`].
+#[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct WeatherSpec {
+    /// °C, -40..=60.
+    pub temperature_c: f32,
+    /// Relative, 0..=1.
+    pub humidity: f32,
+    /// W/m², 0..=1400.
+    pub sun_w_per_m2: f32,
+    /// How many times faster things dry than in the world, 0..=100,000.
+    pub drying_speed: f32,
+}
+
+impl Default for WeatherSpec {
+    fn default() -> Self {
+        let Weather { temperature_c, humidity, sun_w_per_m2, drying_speed, .. } = Weather::default();
+        Self { temperature_c, humidity, sun_w_per_m2, drying_speed }
+    }
+}
+
+impl Scenario {
+    /// The weather of the run.
+    pub fn weather(&self) -> Weather {
+        let WeatherSpec { temperature_c, humidity, sun_w_per_m2, drying_speed } = self.weather;
+        let (wind, sun_direction) = (self.wind, self.sun.direction);
+        Weather { temperature_c, humidity, wind, sun_direction, sun_w_per_m2, drying_speed }
     }
 }
 
@@ -260,6 +294,32 @@ pub struct SurfaceSpec {
     /// Its maps.
     #[serde(default)]
     pub maps: Weatherable,
+    /// A wet map that is played on it, besides what falls.
+    #[serde(default)]
+    pub wet_map: Option<WetMapSpec>,
+}
+
+/// A wet map that is played; see [`PlayedWetMap`](crate::material::PlayedWetMap).
+#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct WetMapSpec {
+    /// `.png`, as `weathering wetmap` makes them.
+    pub map: String,
+    /// From dry to wet or back.
+    pub seconds: f32,
+    /// Softness of the wet border, 0..=1.
+    #[serde(default = "default_map_fill")]
+    pub t_fill: f32,
+    /// Seconds at which it begins.
+    #[serde(default)]
+    pub start: f32,
+    /// Dries instead of wetting.
+    #[serde(default)]
+    pub dries: bool,
+}
+
+fn default_map_fill() -> f32 {
+    0.2
 }
 
 fn default_scale() -> Vec3 {

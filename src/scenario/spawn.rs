@@ -14,9 +14,11 @@ use crate::clock::ClockPlugin;
 use crate::collision::{BuildColliders, MeshColliders, NotWeatherable, SurfaceCollider};
 use crate::effect::{EffectTable, WeatherEffect};
 use crate::emitter::{EmissionSeed, Emitter};
+use crate::material::{PlayedWetMap, Playing};
 use crate::overlay::TexelAreas;
 use crate::particle::{Forces, ParticleConfig};
 use crate::schedule::{WeatheringSystems, WeatheringTick};
+use crate::wetting::{self, ExposureProgress, MeasureSurfaces};
 
 /// Spawns a scenario and runs it once everything is loaded. Virtual time stands still until then.
 ///
@@ -69,12 +71,13 @@ impl Plugin for ScenarioPlugin {
         let scenario = &self.scenario.scenario;
         ClockPlugin { hz: scenario.tick_hz }.insert_clock(app);
         app.insert_resource(EmissionSeed(self.seed.unwrap_or(scenario.seed)))
-            .insert_resource(Forces { gravity: scenario.gravity, wind: scenario.wind })
+            .insert_resource(Forces { gravity: scenario.gravity })
+            .insert_resource(scenario.weather())
             .insert_resource(ParticleConfig { max_alive: scenario.max_particles })
             .insert_resource(CurrentScenario(self.scenario.clone()))
             .init_resource::<ScenarioStatus>()
             .init_resource::<Digest>()
-            .add_systems(PreUpdate, watch_loading.run_if(is_loading).after(BuildColliders))
+            .add_systems(PreUpdate, watch_loading.run_if(is_loading).after(BuildColliders).after(MeasureSurfaces))
             .add_systems(
                 WeatheringTick,
                 (
@@ -125,7 +128,9 @@ fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, loo
             materials.push((name, handle, textures));
         }
     }
+    let mut wet_maps = content.wet_maps.into_iter();
     for (index, (spec, mesh)) in scenario.surfaces.iter().zip(content.meshes).enumerate() {
+        let wet_map = wet_maps.next().flatten().map(|map| world.resource_mut::<Assets<Image>>().add(map));
         let mesh = match (&spec.mesh, mesh) {
             (MeshSpec::File(path), _) => {
                 let label = GltfAssetLabel::Primitive { mesh: 0, primitive: 0 };
@@ -149,6 +154,15 @@ fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, loo
             transform,
             GlobalTransform::from(transform),
         ));
+        if let (Some(map), Some(played)) = (wet_map, &spec.wet_map) {
+            entity.insert(PlayedWetMap {
+                map,
+                seconds: played.seconds,
+                t_fill: played.t_fill,
+                from_tick: (played.start * scenario.tick_hz as f32).round() as u32,
+                playing: if played.dries { Playing::Drying } else { Playing::Wetting },
+            });
+        }
         if let Some(material) = scenario.materials.get(&spec.material) {
             entity.insert((material.porous, material.water));
         }
@@ -218,7 +232,11 @@ fn watch_loading(
     assets: Res<AssetServer>,
     colliders: Res<MeshColliders>,
     surfaces: Query<(&ScenarioSurface, &Mesh3d, Option<&NotWeatherable>)>,
-    unfinished: Query<(), (With<ScenarioSurface>, Or<(Without<SurfaceCollider>, Without<TexelAreas>)>)>,
+    unfinished: Query<
+        (),
+        (With<ScenarioSurface>, Or<(Without<SurfaceCollider>, Without<TexelAreas>, Without<wetting::Exposure>)>),
+    >,
+    exposure: Res<ExposureProgress>,
     mut status: ResMut<ScenarioStatus>,
     mut time: ResMut<Time<Virtual>>,
 ) {
@@ -236,7 +254,7 @@ fn watch_loading(
         *status = ScenarioStatus::Failed(current.0.content_error(&field, value, reason));
         return;
     }
-    if unfinished.is_empty() && colliders.building() == 0 {
+    if unfinished.is_empty() && colliders.building() == 0 && !exposure.is_busy() {
         *status = ScenarioStatus::Ready;
         time.unpause();
     }

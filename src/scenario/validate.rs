@@ -31,6 +31,11 @@ impl LoadedScenario {
         self.vector("wind", scenario.wind, 1000.0)?;
         let most = f64::from(Scenario::MAX_PARTICLES);
         self.range("max_particles", f64::from(scenario.max_particles), 1.0, most)?;
+        let weather = &scenario.weather;
+        self.range("weather.temperature_c", f64::from(weather.temperature_c), -40.0, 60.0)?;
+        self.not_negative("weather.humidity", weather.humidity, 1.0)?;
+        self.not_negative("weather.sun_w_per_m2", weather.sun_w_per_m2, 1400.0)?;
+        self.not_negative("weather.drying_speed", weather.drying_speed, 1.0e5)?;
         self.validate_view()?;
         for (name, material) in &scenario.materials {
             self.validate_material(&format!("materials.{name}"), material)?;
@@ -43,6 +48,12 @@ impl LoadedScenario {
         for (index, surface) in scenario.surfaces.iter().enumerate() {
             let field = format!("surfaces[{index}]");
             self.validate_surface(&field, surface)?;
+            if let Some(map) = &surface.wet_map {
+                self.resolve(&format!("{field}.wet_map.map"), &map.map)?;
+                self.positive(&format!("{field}.wet_map.seconds"), map.seconds, Scenario::MAX_SECONDS)?;
+                self.not_negative(&format!("{field}.wet_map.t_fill"), map.t_fill, 1.0)?;
+                self.not_negative(&format!("{field}.wet_map.start"), map.start, Scenario::MAX_SECONDS)?;
+            }
             if !names.insert(&surface.name) {
                 return Err(self.value(format!("{field}.name"), &surface.name, "unique"));
             }

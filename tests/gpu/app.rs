@@ -17,6 +17,9 @@ use bevy::time::TimeUpdateStrategy;
 use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
 use bevy_weathering::WeatheringPlugins;
+use bevy_weathering::clock::WeatheringClock;
+use bevy_weathering::material::PorousMaterial;
+use bevy_weathering::wetting::{SurfaceWater, WetGeometry};
 
 use super::harness;
 
@@ -141,4 +144,18 @@ pub fn picture(app: &mut App, target: &Handle<Image>) -> image::RgbImage {
     update_until(app, "the picture", |world| world.resource::<Picture>().0.is_some());
     let image = app.world_mut().resource_mut::<Picture>().0.take().unwrap();
     image.try_into_dynamic().unwrap().to_rgb8()
+}
+
+/// Covers a surface with water, film and absorbed, in mm, as soon as its texels are measured.
+pub fn cover(app: &mut App, surface: Entity, film_mm: f32, absorbed_mm: f32) {
+    update_until(app, "the texels to be measured", |world| world.get::<WetGeometry>(surface).is_some());
+    let tick = app.world().resource::<WeatheringClock>().tick();
+    let geometry = app.world().get::<WetGeometry>(surface).unwrap().0.clone();
+    let mut water = app.world_mut().get_mut::<SurfaceWater>(surface).unwrap();
+    water.cover(&geometry, film_mm, absorbed_mm, tick);
+}
+
+/// Matter that shows at once what it holds, and on which nothing runs.
+pub fn still(capacity_mm: f32) -> PorousMaterial {
+    PorousMaterial { t_fill: 0.0, capacity_mm, visible_mm: capacity_mm, retained_mm: 1000.0, ..default() }
 }

@@ -4,14 +4,15 @@ use bevy::camera::{Exposure, ScalingMode};
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::light::EnvironmentMapLight;
 use bevy::prelude::*;
+use bevy::time::TimeUpdateStrategy;
 use bevy_weathering::material::{
     Coated, DryMaterial, Flood, Pores, PorousMaterial, StandingWater, Tweaked, WettingModel,
 };
-use bevy_weathering::overlay::{Overlays, SplatQueue, SplatStats, Weatherable};
+use bevy_weathering::overlay::{Overlays, Weatherable};
 use image::RgbImage;
 
-use super::app::{add_target, app, camera, picture, update, update_until};
-use super::images::{even_water, keep};
+use super::app::{add_target, app, camera, cover, picture, still, update, update_until};
+use super::images::keep;
 
 const ROUGHNESSES: [f32; 5] = [0.1, 0.325, 0.55, 0.775, 1.0];
 
@@ -73,7 +74,7 @@ fn furnace(metallic: f32) -> Option<Furnace> {
                         place,
                         Weatherable { map_size: 64, ..default() },
                         StandingWater { flood, ..default() },
-                        PorousMaterial { t_fill: 0.0, capacity_mm: 5.0, ..default() },
+                        still(5.0),
                     ))
                     .id(),
             );
@@ -84,18 +85,17 @@ fn furnace(metallic: f32) -> Option<Furnace> {
             .iter()
             .all(|&ball| world.get::<Overlays>(ball).is_some() && world.get::<DryMaterial>(ball).is_some())
     });
-    let mut splats = 0;
     for (i, &ball) in balls.iter().enumerate() {
         let part = WATERS[i % WATERS.len()].1;
         if part > 0.0 {
-            // 2.54 m² in 4,096 texels, 5 mm deep; stamps are a little uneven.
-            let mm3_per_texel = 2.54e6 / 4096.0 * 5.0 * part;
-            let mut queue = app.world_mut().get_mut::<SplatQueue>(ball).unwrap();
-            even_water(mm3_per_texel / 4.0).into_iter().for_each(|splat| queue.push(splat));
-            splats += 4;
+            cover(&mut app, ball, (part - 1.0).max(0.0) * 5.0, part.min(1.0) * 5.0);
         }
     }
-    update_until(&mut app, "the water", |world| world.resource::<SplatStats>().splats() >= splats);
+    // Understood in the tick after.
+    app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+    for _ in 0..3 {
+        update(&mut app);
+    }
     Some(Furnace { app, target, balls })
 }
 

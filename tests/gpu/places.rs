@@ -16,11 +16,11 @@ use bevy::prelude::*;
 use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat};
 use bevy::time::TimeUpdateStrategy;
 use bevy_weathering::material::{DryMaterial, Pores, PorousMaterial, WettingModel};
-use bevy_weathering::overlay::{Overlays, SplatQueue, SplatStats, Weatherable, Wrap};
+use bevy_weathering::overlay::{Overlays, Weatherable, Wrap};
 use image::RgbImage;
 
-use super::app::{add_target, app, camera, picture, update, update_until};
-use super::images::{difference, even_water, keep};
+use super::app::{add_target, app, camera, cover, picture, still, update, update_until};
+use super::images::{difference, keep};
 
 const SIZE: UVec2 = UVec2::new(80, 60);
 
@@ -82,7 +82,7 @@ fn draw(place: &Place, porous: Option<f32>) -> Option<RgbImage> {
         let model = WettingModel::Hnat(Pores { alpha_poro, ..default() });
         for surface in [ball, floor] {
             // All that falls goes into the pores: no film.
-            let porous = PorousMaterial { model, t_fill: 0.0, capacity_mm: 5.0, ..default() };
+            let porous = PorousMaterial { model, ..still(5.0) };
             app.world_mut().entity_mut(surface).insert((maps, porous));
         }
         update_until(&mut app, "the maps and materials", |world| {
@@ -91,10 +91,8 @@ fn draw(place: &Place, porous: Option<f32>) -> Option<RgbImage> {
             })
         });
         for surface in [ball, floor] {
-            let mut queue = app.world_mut().get_mut::<SplatQueue>(surface).unwrap();
-            even_water(400.0).into_iter().for_each(|splat| queue.push(splat));
+            cover(&mut app, surface, 0.0, 1.0);
         }
-        update_until(&mut app, "the water", |world| world.resource::<SplatStats>().splats() >= 8);
     }
     app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
     // As many in all for both, where frames are blended with those before.

@@ -10,8 +10,8 @@ use bevy_weathering::overlay::{Overlays, Splat, SplatQueue, Weatherable};
 use bevy_weathering::scenes::meshes;
 use image::RgbImage;
 
-use super::app::{add_target, app, camera, picture, update, update_until};
-use super::images::{difference, even_water};
+use super::app::{add_target, app, camera, cover, picture, still, update, update_until};
+use super::images::difference;
 
 const SIZE: UVec2 = UVec2::new(96, 96);
 
@@ -120,17 +120,12 @@ fn a_drop_that_really_falls_sends_out_a_ring_that_dies() {
     let Some(mut scene) = above(ground()) else { return };
     scene.set(StandingWater { flood: DEEP, ..default() });
     // So that the next water changes nothing but the ring.
-    let wet = |scene: &mut Scene, splat: Splat| {
-        scene.app.world_mut().get_mut::<SplatQueue>(scene.surface).unwrap().push(splat);
-    };
-    even_water(100.0).into_iter().for_each(|splat| wet(&mut scene, splat));
+    cover(&mut scene.app, scene.surface, 0.1, 0.05);
     let still = scene.after(60);
     let tick = scene.app.world().resource::<bevy_weathering::clock::WeatheringClock>().tick();
     let center = [32 * 256; 2];
-    wet(
-        &mut scene,
-        Splat { center, radius: [512; 2], water_nl: 50_000, tick, ..bytemuck::Zeroable::zeroed() },
-    );
+    let drop = Splat { center, radius: [512; 2], water_nl: 50_000, tick, ..bytemuck::Zeroable::zeroed() };
+    scene.app.world_mut().get_mut::<SplatQueue>(scene.surface).unwrap().push(drop);
     let young = scene.after(8);
     let old = scene.after(40);
     assert!(difference(&young, &still).1 > 6, "{:?}", difference(&young, &still));
@@ -196,10 +191,9 @@ fn light_comes_through_wet_cloth() {
     let Some(mut scene) = Scene::new(cloth, Vec3::Z * 2.5, Vec3::new(0.1, -0.2, 1.0), 600.0, material) else {
         return;
     };
-    scene.set(PorousMaterial { wet_translucency: 0.7, t_fill: 0.0, capacity_mm: 0.5, ..default() });
+    scene.set(PorousMaterial { wet_translucency: 0.7, ..still(0.5) });
     let dry = mean(&scene.after(4));
-    let mut queue = scene.app.world_mut().get_mut::<SplatQueue>(scene.surface).unwrap();
-    even_water(200.0).into_iter().for_each(|splat| queue.push(splat));
+    cover(&mut scene.app, scene.surface, 0.0, 0.5);
     let wet = mean(&scene.after(6));
     assert!(wet > 1.3 * dry, "dry {dry}, wet {wet}");
 }
@@ -218,13 +212,10 @@ fn ever_wetter(model: WettingModel, metallic: f32) -> Option<Vec<RgbImage>> {
     };
     let eye = Vec3::new(0.0, 1.6, 1.6);
     let mut scene = Scene::new(ground(), eye, Vec3::new(0.0, -1.0, 0.4), 100.0, material)?;
-    scene.set(PorousMaterial { model, t_fill: 0.0, capacity_mm: 1.0, ..default() });
+    scene.set(PorousMaterial { model, ..still(1.0) });
     let mut pictures = vec![scene.after(3)];
     for _ in 0..3 {
-        // A quarter of a mm on 4 m² in 4,096 texels, in four stamps.
-        for splat in even_water(4.0e6 / 4096.0 / 16.0) {
-            scene.app.world_mut().get_mut::<SplatQueue>(scene.surface).unwrap().push(splat);
-        }
+        cover(&mut scene.app, scene.surface, 0.0, 0.25);
         pictures.push(scene.after(3));
     }
     Some(pictures)

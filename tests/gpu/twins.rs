@@ -1,7 +1,9 @@
 //! Wet models, films, floods and ripples: every function of the shaders against its double-precision twin.
 
-use bevy_weathering::material::film::{flood, held, layer, ripples};
+use bevy_weathering::material::film::{flood, layer, ripples};
 use bevy_weathering::material::models::{authored, film_on_pores, lagarde, lekner_dorf, twomey};
+use bevy_weathering::wetting::evolve::{Amounts, Matter, evolve};
+use bevy_weathering::wetting::look;
 
 use super::harness;
 
@@ -15,7 +17,7 @@ const SOURCES: [(&str, &str); 10] = [
     ("water_film.wgsl", include_str!("../../shaders/common/water_film.wgsl")),
     ("flood.wgsl", include_str!("../../shaders/common/flood.wgsl")),
     ("ripples.wgsl", include_str!("../../shaders/common/ripples.wgsl")),
-    ("held_water.wgsl", include_str!("../../shaders/common/held_water.wgsl")),
+    ("drying.wgsl", include_str!("../../shaders/common/drying.wgsl")),
 ];
 
 /// Random numbers of one input, each in `[0, 1)`.
@@ -138,15 +140,35 @@ const TWINS: &[Twin] = &[
         wgsl: "ripples::rain_slopes(vec2(20.0 * x[0] - 10.0, 20.0 * x[1] - 10.0), 60.0 * x[2], 30.0 * x[3]).y",
         rust: |x| ripples::rain_slopes([20.0 * x[0] - 10.0, 20.0 * x[1] - 10.0], 60.0 * x[2], 30.0 * x[3])[1],
     },
+    Twin { wgsl: "drying::drying_sigmoid(x[0])", rust: |x| look::drying_sigmoid(x[0]) },
+    Twin { wgsl: "drying::gloss_left(x[0])", rust: |x| look::gloss_left(x[0]) },
     Twin {
-        wgsl: "held_water::water_look(u32(x[0] * 1000.0), x[1], 300.0, 0.1, x[2]).x",
-        rust: |x| held::water_look((x[0] * 1000.0) as u32, x[1], 300.0, 0.1, x[2]).0,
+        wgsl: "drying::water_look(x[0], 0.05 + x[1], x[2], 2.0 * x[3] - 0.5, 0.2 + x[4]).x",
+        rust: |x| look::water_look(x[0], 0.05 + x[1], x[2], 2.0 * x[3] - 0.5, 0.2 + x[4]).wetness,
     },
     Twin {
-        wgsl: "held_water::water_look(u32(x[0] * 1000.0), x[1], 300.0, 0.1, x[2]).y",
-        rust: |x| held::water_look((x[0] * 1000.0) as u32, x[1], 300.0, 0.1, x[2]).1,
+        wgsl: "drying::water_look(x[0], 0.05 + x[1], x[2], 2.0 * x[3] - 0.5, 0.2 + x[4]).y",
+        rust: |x| look::water_look(x[0], 0.05 + x[1], x[2], 2.0 * x[3] - 0.5, 0.2 + x[4]).gloss,
+    },
+    Twin {
+        wgsl: "drying::evolve(drying::Amounts(x[0], x[1], 0.2 * x[2]), x[3] * x[3], 0.1 + 2.0 * x[4], 4.0 * x[5], 2.0 * x[6]).film_mm",
+        rust: |x| evolved(x).film_mm,
+    },
+    Twin {
+        wgsl: "drying::evolve(drying::Amounts(x[0], x[1], 0.2 * x[2]), x[3] * x[3], 0.1 + 2.0 * x[4], 4.0 * x[5], 2.0 * x[6]).pores_mm",
+        rust: |x| evolved(x).pores_mm,
+    },
+    Twin {
+        wgsl: "drying::evolve(drying::Amounts(x[0], x[1], 0.2 * x[2]), x[3] * x[3], 0.1 + 2.0 * x[4], 4.0 * x[5], 2.0 * x[6]).reserve_mm",
+        rust: |x| evolved(x).reserve_mm,
     },
 ];
+
+fn evolved(x: &[f64; NUMBERS]) -> Amounts {
+    let before = Amounts { film_mm: x[0], pores_mm: x[1], reserve_mm: 0.2 * x[2] };
+    let matter = Matter { sorptivity_squared: x[3] * x[3], capacity_mm: 0.1 + 2.0 * x[4] };
+    evolve(before, matter, 4.0 * x[5], 2.0 * x[6])
+}
 
 fn inputs() -> Vec<[f32; NUMBERS]> {
     let mut state = 0x1234_5678u32;

@@ -3,10 +3,10 @@
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 use bevy_weathering::material::{DryMaterial, PorousMaterial, Understudy, WeatheredMaterial, WettingModel};
-use bevy_weathering::overlay::{Overlays, SplatQueue, Weatherable};
+use bevy_weathering::overlay::{Overlays, Weatherable};
 
-use super::app::{add_target, app_that_compiles_in_the_background, camera, picture, update, update_until};
-use super::images::{even_water, keep};
+use super::app::{add_target, app_that_compiles_in_the_background, camera, cover, picture, still, update, update_until};
+use super::images::keep;
 
 const SIZE: UVec2 = UVec2::new(64, 64);
 
@@ -31,7 +31,7 @@ fn surfaces_stay_in_sight_when_the_first_water_comes_and_when_the_model_changes(
     let material = world.resource_mut::<Assets<StandardMaterial>>().add(Color::srgb(0.9, 0.1, 0.1));
     let mesh = world.resource_mut::<Assets<Mesh>>().add(Rectangle::new(3.0, 3.0));
     let maps = Weatherable { map_size: 64, ..default() };
-    let porous = PorousMaterial { t_fill: 0.0, capacity_mm: 1.0, ..default() };
+    let porous = still(1.0);
     let surface = world.spawn((Mesh3d(mesh), MeshMaterial3d(material), maps, porous)).id();
     update_until(&mut app, "the maps and materials", |world| {
         world.get::<Overlays>(surface).is_some() && world.get::<DryMaterial>(surface).is_some()
@@ -63,8 +63,7 @@ fn surfaces_stay_in_sight_when_the_first_water_comes_and_when_the_model_changes(
         }
         panic!("the shader was never exchanged");
     };
-    let mut queue = app.world_mut().get_mut::<SplatQueue>(surface).unwrap();
-    even_water(300.0).into_iter().for_each(|splat| queue.push(splat));
+    cover(&mut app, surface, 0.0, 1.0);
     until_changed(&mut app);
     assert!(model_of(&app).water);
     for model in [WettingModel::Twomey(default()), WettingModel::Lagarde(default())] {

@@ -1,6 +1,5 @@
 //! Water above the matter: a layer of its own, over any [model](super::models).
 
 pub mod flood;
-pub mod held;
 pub mod layer;
 pub mod ripples;

@@ -6,7 +6,8 @@ use bevy::prelude::*;
 use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat, TextureUsages};
 use bevy::render::storage::ShaderBuffer;
 
-use crate::overlay::{RainRing, TILE_SIZE, TexelState, Weatherable, Wrap};
+use crate::overlay::{RainRing, TILE_SIZE, Weatherable, Wrap};
+use crate::wetting::gpu::GpuTexelWater;
 
 /// The maps of a surface on the GPU. Begin empty; all zeros mean "nothing here".
 #[derive(Component, Reflect, Debug, Clone)]
@@ -22,8 +23,10 @@ pub struct Overlays {
     pub specular: Handle<Image>,
     /// Slope along u and v (0.5 is flat), unused, coverage; `rgba8unorm`, premultiplied.
     pub normal: Handle<Image>,
-    /// [`TexelState`] of each texel, row by row.
+    /// [`GpuTexelWater`] of each texel, tile by tile; a single one while nothing has been wet.
     pub state: Handle<ShaderBuffer>,
+    /// `state` has room for all texels.
+    pub has_room: bool,
     /// [`RainRing::PER_TILE`] [`RainRing`]s of each tile, row by row.
     pub rings: Handle<ShaderBuffer>,
 }
@@ -36,10 +39,10 @@ impl Overlays {
             (image("diffuse overlay"), image("specular overlay"), image("normal overlay"));
         // wgpu zeroes what is created without data.
         let mut buffer = |bytes| buffers.add(ShaderBuffer::with_size(bytes, RenderAssetUsages::RENDER_WORLD));
-        let state = buffer((size * size) as usize * size_of::<TexelState>());
+        let state = buffer(size_of::<GpuTexelWater>());
         let tiles = (size / TILE_SIZE).pow(2);
         let rings = buffer((tiles * RainRing::PER_TILE) as usize * size_of::<RainRing>());
-        Self { size, wrap: surface.wrap(), diffuse, specular, normal, state, rings }
+        Self { size, wrap: surface.wrap(), diffuse, specular, normal, state, has_room: false, rings }
     }
 }
 

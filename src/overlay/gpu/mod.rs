@@ -1,6 +1,6 @@
 //! Painting splats on the GPU: one compute pass before the cameras draw.
 //!
-//! Main world: every surface gets textures and a state buffer ([`Overlays`]). Extract moves the waiting splats over
+//! Main world: every surface gets textures and buffers ([`Overlays`]). Extract moves the waiting splats over
 //! (each exactly once, however many ticks the frame held). Prepare sorts them into tiles and uploads them; until
 //! the pipeline and the maps exist, they wait. The pass dispatches one workgroup per touched tile: a surface
 //! without new splats costs nothing, which [`SplatStats`] shows.

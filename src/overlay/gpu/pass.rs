@@ -41,7 +41,7 @@ pub(super) fn init_splat_pipeline(
         "weathering surface",
         &BindGroupLayoutEntries::sequential(
             ShaderStages::COMPUTE,
-            (map(), map(), map(), storage_buffer_sized(false, None), storage_buffer_sized(false, None)),
+            (map(), map(), map(), storage_buffer_sized(false, None)),
         ),
     );
     let shader = assets.load(

@@ -82,7 +82,6 @@ struct Maps {
     size: u32,
     wrap: [Wrap; 2],
     images: [AssetId<Image>; 3],
-    state: AssetId<ShaderBuffer>,
     rings: AssetId<ShaderBuffer>,
 }
 
@@ -92,7 +91,6 @@ impl From<&Overlays> for Maps {
             size: overlays.size,
             wrap: overlays.wrap,
             images: [overlays.diffuse.id(), overlays.specular.id(), overlays.normal.id()],
-            state: overlays.state.id(),
             rings: overlays.rings.id(),
         }
     }
@@ -115,7 +113,7 @@ pub(super) fn extract_splats(
             surfaces.len() - 1
         });
         let waiting = &mut surfaces[index];
-        if waiting.maps.state != overlays.state.id() {
+        if waiting.maps.rings != overlays.rings.id() {
             // New maps: what was meant for the old ones is gone with them.
             waiting.splats.clear();
         }
@@ -188,12 +186,11 @@ pub(super) fn prepare_splats(
     tiles.clear();
     list.clear();
     for waiting in pending.surfaces.iter_mut().filter(|surface| !surface.splats.is_empty()) {
-        let Maps { size, wrap, images: [diffuse, specular, normal], state, rings } = waiting.maps;
-        let (Some(diffuse), Some(specular), Some(normal), Some(state), Some(rings)) = (
+        let Maps { size, wrap, images: [diffuse, specular, normal], rings } = waiting.maps;
+        let (Some(diffuse), Some(specular), Some(normal), Some(rings)) = (
             images.get(diffuse),
             images.get(specular),
             images.get(normal),
-            buffers.get(state),
             buffers.get(rings),
         ) else {
             continue;
@@ -212,7 +209,6 @@ pub(super) fn prepare_splats(
                     &diffuse.texture_view,
                     &specular.texture_view,
                     &normal.texture_view,
-                    state.buffer.as_entire_buffer_binding(),
                     rings.buffer.as_entire_buffer_binding(),
                 )),
             ),
@@ -254,6 +250,7 @@ mod tests {
             specular: default(),
             normal: default(),
             state: default(),
+            has_room: false,
             rings: default(),
         };
         let surface = main.spawn((overlays, SplatQueue::default())).id();
@@ -297,7 +294,7 @@ mod tests {
         push(&mut render, surface, 0..3);
         schedule.run(&mut render);
         let other = Handle::Uuid(bevy::asset::uuid::Uuid::from_u128(7), std::marker::PhantomData);
-        render.resource_mut::<MainWorld>().get_mut::<Overlays>(surface).unwrap().state = other;
+        render.resource_mut::<MainWorld>().get_mut::<Overlays>(surface).unwrap().rings = other;
         push(&mut render, surface, 3..4);
         schedule.run(&mut render);
         assert_eq!(pending(&render), [3]);

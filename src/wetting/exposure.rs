@@ -1,0 +1,251 @@
+//! How well air and sun get at each texel, by rays against everything there is.
+//!
+//! Air: the part of the hemisphere above a point from which nothing is near. Convex places are open and dry first, corners
+//! and the ground under things keep their damp. Sun: the cosine of its direction, where it is seen.
+//!
+//! Both vary slowly, so they are worked out on a grid of [`Exposure::CELLS`] cells a side over the map, in the background,
+//! and laid between the cells bilinearly. Until that is done every texel counts as free and shaded.
+
+use std::sync::Arc;
+
+use bevy::math::Affine3A;
+use bevy::prelude::*;
+use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+
+use super::points::surface_points;
+use super::prepare::Measured;
+use super::{Now, SurfaceWater, TexelGeometry, WetGeometry};
+use crate::clock::WeatheringClock;
+use crate::collision::{CollisionScene, MeshBvh, MeshColliders, SurfaceCollider};
+use crate::material::PorousMaterial;
+use crate::overlay::Wrap;
+use crate::weather::{DryingClock, Weather};
+//TMPfn
+fn accessibility(_: &CollisionScene, p: &[super::SurfacePoint], _: u32, _: f32) -> Vec<f32> { vec![1.0; p.len()] }
+fn sun_visibility(_: &CollisionScene, p: &[super::SurfacePoint], _: Vec3) -> Vec<f32> { vec![1.0; p.len()] }
+
+/// What of the weather's demand gets at each texel of a surface.
+#[derive(Component, Debug, Clone, PartialEq)]
+pub struct Exposure {
+    /// 128 is all that a free, even surface gets.
+    air: Vec<u8>,
+    /// 255 faces the sun squarely.
+    sun: Vec<u8>,
+    towards_sun: Option<Vec3>,
+}
+
+impl Exposure {
+    /// Cells along each side of the map for which rays are cast.
+    pub const CELLS: u32 = 96;
+    /// Rays that look for air, for each cell.
+    pub const RAYS: u32 = 32;
+    /// How far away, in metres, nothing is in the way of air any more.
+    pub const REACH: f32 = 0.5;
+
+    /// Parts of the demand of air and sun at a texel.
+    pub fn at(&self, texel: u32) -> (f64, f64) {
+        let [air, sun] = self.bytes_at(texel);
+        (f64::from(air) / 128.0, f64::from(sun) / 255.0)
+    }
+
+    /// The same as it is stored: 128 and 255 are 1.
+    pub fn bytes_at(&self, texel: u32) -> [u8; 2] {
+        [self.air[texel as usize], self.sun[texel as usize]]
+    }
+
+    /// What is used while there is none.
+    pub const FREE: [u8; 2] = [128, 0];
+
+    fn bake(scene: &CollisionScene, job: &Job, towards_sun: Option<Vec3>) -> Self {
+        let size = job.size;
+        let points = surface_points(job.bvh.triangles(), &job.world_from_mesh, size, job.wrap);
+        let cells = Self::CELLS.min(size);
+        // The point of each cell that is nearest to its middle.
+        let side = size / cells;
+        let cell_of = |texel: u32| {
+            ((texel / size / side).min(cells - 1) * cells + (texel % size / side).min(cells - 1)) as usize
+        };
+        let mut chosen: Vec<Option<(u32, usize)>> = vec![None; (cells * cells) as usize];
+        for (number, point) in points.iter().enumerate() {
+            let (x, y) = (point.texel % size % side, point.texel / size % side);
+            let off = x.abs_diff(side / 2) + y.abs_diff(side / 2);
+            let cell = &mut chosen[cell_of(point.texel)];
+            if cell.is_none_or(|(least, _)| off < least) {
+                *cell = Some((off, number));
+            }
+        }
+        let picked: Vec<_> = chosen.iter().flatten().map(|&(_, number)| points[number]).collect();
+        let open = accessibility(scene, &picked, Self::RAYS, Self::REACH);
+        let lit = towards_sun.map(|sun| sun_visibility(scene, &picked, sun));
+        let mut grid = vec![None; chosen.len()];
+        let filled = chosen.iter().enumerate().filter(|(_, cell)| cell.is_some());
+        for (number, (cell, _)) in filled.enumerate() {
+            grid[cell] = Some([open[number], lit.as_ref().map_or(0.0, |lit| lit[number])]);
+        }
+        let grid = dilated(grid, cells as usize, job.wrap);
+        let mut exposure = Self {
+            air: Vec::with_capacity((size * size) as usize),
+            sun: Vec::with_capacity((size * size) as usize),
+            towards_sun,
+        };
+        for y in 0..size {
+            for x in 0..size {
+                let [open, lit] = between_cells(&grid, cells, side, job.wrap, x, y);
+                // A free plane, which sees half of everything, gets 1.
+                let air = 0.35 + 0.65 * open;
+                exposure.air.push((air * 128.0).round().clamp(1.0, 255.0) as u8);
+                exposure.sun.push((lit * 255.0).round().clamp(0.0, 255.0) as u8);
+            }
+        }
+        exposure
+    }
+}
+
+/// Gives cells without surface the mean of those around them, ring by ring.
+fn dilated(mut grid: Vec<Option<[f32; 2]>>, side: usize, wrap: [Wrap; 2]) -> Vec<[f32; 2]> {
+    for _ in 0..side {
+        if grid.iter().all(Option::is_some) {
+            break;
+        }
+        let before = grid.clone();
+        for (index, cell) in grid.iter_mut().enumerate().filter(|(_, cell)| cell.is_none()) {
+            let (x, y) = (index % side, index / side);
+            let (mut sum, mut count) = ([0.0; 2], 0.0);
+            for (dx, dy) in [(-1, 0), (1, 0), (0, -1), (0, 1)] {
+                let along = |at: usize, step: i32, wrap: Wrap| match wrap {
+                    Wrap::Repeat => (at as i32 + step).rem_euclid(side as i32) as usize,
+                    Wrap::Clamp => (at as i32 + step).clamp(0, side as i32 - 1) as usize,
+                };
+                if let Some(value) = before[along(y, dy, wrap[1]) * side + along(x, dx, wrap[0])] {
+                    sum = [sum[0] + value[0], sum[1] + value[1]];
+                    count += 1.0;
+                }
+            }
+            if count > 0.0 {
+                *cell = Some(sum.map(|value| value / count));
+            }
+        }
+    }
+    grid.into_iter().map(|cell| cell.unwrap_or([1.0, 0.0])).collect()
+}
+
+/// Bilinear between the middles of cells.
+fn between_cells(grid: &[[f32; 2]], cells: u32, side: u32, wrap: [Wrap; 2], x: u32, y: u32) -> [f32; 2] {
+    let place = |texel: u32, wrap: Wrap| {
+        let at = (texel as f32 + 0.5) / side as f32 - 0.5;
+        let low = at.floor() as i32;
+        let inside = |cell: i32| match wrap {
+            Wrap::Repeat => cell.rem_euclid(cells as i32) as u32,
+            Wrap::Clamp => cell.clamp(0, cells as i32 - 1) as u32,
+        };
+        (inside(low), inside(low + 1), at - low as f32)
+    };
+    let ((x0, x1, fx), (y0, y1, fy)) = (place(x, wrap[0]), place(y, wrap[1]));
+    let cell = |x: u32, y: u32| grid[(y * cells + x) as usize];
+    let mix = |a: [f32; 2], b: [f32; 2], t: f32| [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t];
+    mix(mix(cell(x0, y0), cell(x1, y0), fx), mix(cell(x0, y1), cell(x1, y1), fx), fy)
+}
+
+/// The work that is under way.
+#[derive(Resource, Default)]
+pub struct ExposureProgress {
+    task: Option<Task<Vec<(Entity, Arc<TexelGeometry>, Exposure)>>>,
+}
+
+impl ExposureProgress {
+    /// Whether rays are being cast.
+    pub fn is_busy(&self) -> bool {
+        self.task.is_some()
+    }
+}
+
+struct Job {
+    surface: Entity,
+    geometry: Arc<TexelGeometry>,
+    bvh: Arc<MeshBvh>,
+    world_from_mesh: Affine3A,
+    size: u32,
+    wrap: [Wrap; 2],
+}
+
+/// Cosine of the angle by which the sun has to move until its shadows are looked for again.
+const SUN_MOVED: f32 = 0.99;
+
+type Exposed = (
+    Entity,
+    &'static WetGeometry,
+    &'static SurfaceCollider,
+    &'static GlobalTransform,
+    &'static mut SurfaceWater,
+    Option<&'static PorousMaterial>,
+    Option<&'static mut Exposure>,
+);
+
+/// Casts rays for surfaces that have no exposure yet, or whose sun has moved.
+pub(super) fn bake_exposure(
+    mut commands: Commands,
+    clock: Res<WeatheringClock>,
+    drying: Res<DryingClock>,
+    weather: Res<Weather>,
+    colliders: Res<MeshColliders>,
+    mut progress: ResMut<ExposureProgress>,
+    unmeasured: Query<(), (With<Measured>, Without<WetGeometry>)>,
+    mut surfaces: Query<Exposed>,
+) {
+    if let Some(task) = &mut progress.task {
+        let Some(baked) = check_ready(task) else { return };
+        progress.task = None;
+        for (entity, geometry, exposure) in baked {
+            let Ok((_, current, _, _, mut water, material, old)) = surfaces.get_mut(entity) else { continue };
+            if !Arc::ptr_eq(&geometry, &current.0) {
+                continue;
+            }
+            // What has dried until now has dried by the old one.
+            let default = PorousMaterial::default();
+            let material = material.unwrap_or(&default);
+            if water.is_wet() {
+                let now = Now::new(clock.tick(), clock.hz(), &drying, &current.0, old.as_deref(), material);
+                water.settle_all(&now);
+            }
+            match old {
+                Some(mut old) => *old = exposure,
+                None => {
+                    commands.entity(entity).insert(exposure);
+                }
+            }
+        }
+        return;
+    }
+    if colliders.building() > 0 || !unmeasured.is_empty() {
+        return;
+    }
+    let sun = weather.towards_sun();
+    let moved = |old: Option<Vec3>| match (old, sun) {
+        (Some(old), Some(new)) => old.dot(new) < SUN_MOVED,
+        (old, new) => old.is_some() != new.is_some(),
+    };
+    let wanted =
+        surfaces.iter().any(|(.., exposure)| exposure.is_none_or(|exposure| moved(exposure.towards_sun)));
+    if !wanted {
+        return;
+    }
+    let mut jobs: Vec<Job> = Vec::new();
+    let mut scene = Vec::new();
+    for (surface, geometry, collider, transform, water, _, exposure) in &surfaces {
+        let (world_from_mesh, bvh) = (transform.affine(), collider.0.clone());
+        scene.push((surface, world_from_mesh, bvh.clone()));
+        if exposure.is_none_or(|exposure| moved(exposure.towards_sun)) {
+            let (size, wrap) = (water.size, water.wrap);
+            jobs.push(Job { surface, geometry: geometry.0.clone(), bvh, world_from_mesh, size, wrap });
+        }
+    }
+    scene.sort_unstable_by_key(|(entity, ..)| *entity);
+    progress.task = Some(AsyncComputeTaskPool::get().spawn(async move {
+        let scene = CollisionScene::new(scene);
+        let bake = |job: Job| {
+            let exposure = Exposure::bake(&scene, &job, sun);
+            (job.surface, job.geometry, exposure)
+        };
+        jobs.into_iter().map(bake).collect()
+    }));
+}

@@ -1,0 +1,198 @@
+//! What lies beside a texel on the mesh.
+
+use bevy::math::DVec2;
+
+use super::grid::{Grid, Side};
+use super::links::Link;
+use super::ownership::{NOBODY, Ownership};
+use super::walk::{Leg, Place, Surface};
+
+/// How many times as far the way may lead if it ends in the texel it began in.
+const LONGEST_STEP: i32 = 3;
+
+/// Where the first sample behind a seam lies, in texels: past the seam in spite of rounding.
+const PAST_THE_SEAM: f64 = 1.0 / 64.0;
+
+/// Distance between two samples behind a seam, in texels.
+const SAMPLES_APART: f64 = 0.5;
+
+/// Samples on one triangle behind a seam, at most.
+const MAX_SAMPLES: u32 = 64;
+
+/// How far a texel is sought in place of one that no triangle owns, in texels along each axis.
+const SEARCH_TEXELS: i32 = 2;
+
+/// How far, in reaches of a triangle, the middle of a texel may lie from a place that falls into it: half,
+/// and what bends and changes of density add.
+const SAME_TEXEL_REACHES: f64 = 0.6;
+
+/// The same for the middles of texels side by side.
+const NEIGHBOUR_REACHES: f64 = 1.2;
+
+/// The same for a place and a texel that is sought around it.
+const SEARCH_REACHES: f64 = 3.0;
+
+/// Finds texels along ways over the surface.
+pub(super) struct Finder<'a> {
+    pub(super) grid: Grid,
+    pub(super) surface: &'a Surface,
+    pub(super) owners: &'a Ownership,
+    /// For each triangle, how long a texel is along u and along v together, metres; 0 if that cannot be told.
+    /// From the middle of a texel to any point of it is no further than half of that.
+    reach: Vec<f64>,
+}
+
+/// Where a way ends.
+enum End {
+    Texel(u32),
+    /// In the texel in which it began.
+    Itself,
+    MeshEnds,
+    /// At a place for which no texel stands, or one far from it: and which will do if need be.
+    Elsewhere(Option<u32>),
+}
+
+impl<'a> Finder<'a> {
+    pub(super) fn new(grid: Grid, surface: &'a Surface, owners: &'a Ownership) -> Self {
+        let reach = |triangle: u32| {
+            let length = |step| surface.step_in_space(triangle, step).map_or(0.0, |step| step.length());
+            let reach = length(DVec2::X) + length(DVec2::Y);
+            if reach.is_finite() { reach } else { 0.0 }
+        };
+        Self { grid, surface, owners, reach: (0..surface.map.len() as u32).map(reach).collect() }
+    }
+
+    /// Where an owned texel lies on its triangle.
+    pub(super) fn place(&self, texel: u32) -> Option<Place> {
+        let triangle = self.owners.of(texel)?;
+        let [second, third] = self.owners.weights[texel as usize].map(f64::from);
+        Some(Place { triangle, weights: [1.0 - second - third, second, third] })
+    }
+
+    /// The texel that lies on a side of an owned texel, on the mesh.
+    pub(super) fn link(&self, texel: u32, side: Side) -> Link {
+        let Some(start) = self.place(texel) else { return Link::Edge };
+        let beside = self.grid.beside(texel, side.offset()).filter(|&other| self.owners.of(other).is_some());
+        let [columns, rows] = side.offset().map(f64::from);
+        let (mut spare, mut moved) = (None, false);
+        for length in (1..=LONGEST_STEP).map(f64::from) {
+            let Some(end) = self.end(texel, start, DVec2::new(columns, rows) * length) else {
+                // The triangle is a line on the map and has no directions there.
+                let near = beside.filter(|&other| self.is_near(&start, other, NEIGHBOUR_REACHES));
+                return near.map_or(Link::Edge, Link::Texel);
+            };
+            match end {
+                End::Texel(other) => return Link::Texel(other),
+                End::MeshEnds => return spare.map_or(Link::Edge, Link::Texel),
+                End::Itself => {}
+                End::Elsewhere(other) => {
+                    spare = spare.or(other);
+                    moved = true;
+                }
+            }
+        }
+        spare.or(beside.filter(|_| !moved)).map_or(Link::Edge, Link::Texel)
+    }
+
+    /// The texel that stands for the surface so many columns and rows away from an owned texel; the texel
+    /// itself where the mesh ends before.
+    pub(super) fn stand_in(&self, texel: u32, [columns, rows]: [i32; 2]) -> u32 {
+        let walk = self
+            .place(texel)
+            .and_then(|start| self.surface.walk(start, DVec2::new(f64::from(columns), f64::from(rows))));
+        let Some(last) = walk.and_then(Iterator::last).filter(|last| !last.mesh_ends) else { return texel };
+        match self.at_end(&last, NOBODY, None) {
+            End::Texel(other) | End::Elsewhere(Some(other)) => other,
+            End::Itself | End::MeshEnds | End::Elsewhere(None) => texel,
+        }
+    }
+
+    /// Follows a way from a texel. None if its triangle has no directions on the map.
+    fn end(&self, texel: u32, start: Place, step: DVec2) -> Option<End> {
+        let mut last = None;
+        for leg in self.surface.walk(start, step)? {
+            // Behind a seam the first texel counts, not the one at the end: which of an island's outermost
+            // texels still have their middles on the mesh is chance, and none may be stepped over.
+            if let Some(other) = self.first_behind_seam(&leg, texel) {
+                return Some(End::Texel(other));
+            }
+            if leg.mesh_ends {
+                return Some(End::MeshEnds);
+            }
+            last = Some(leg);
+        }
+        Some(last.map_or(End::Itself, |last| self.at_end(&last, texel, Some(start))))
+    }
+
+    /// The first texel on a leg behind a seam that stands for what lies there, and is not where the way
+    /// began.
+    fn first_behind_seam(&self, leg: &Leg, began: u32) -> Option<u32> {
+        if !leg.over_seam {
+            return None;
+        }
+        let length = self.surface.on_map(&leg.from).distance(self.surface.on_map(&leg.to));
+        (0..MAX_SAMPLES)
+            .map(|sample| PAST_THE_SEAM + f64::from(sample) * SAMPLES_APART)
+            .take_while(|&way| way < length)
+            .find_map(|way| {
+                let place = leg.at(way / length);
+                let texel = self.grid.at(self.surface.on_map(&place));
+                (texel != began && self.stands_for(&place, texel)).then_some(texel)
+            })
+    }
+
+    /// The texel in which the last leg of a way ends that began in `began`, at `start`.
+    fn at_end(&self, last: &Leg, began: u32, start: Option<Place>) -> End {
+        let texel = self.grid.at(self.surface.on_map(&last.to));
+        if texel == began {
+            return End::Itself;
+        }
+        let owned = self.owners.of(texel).is_some();
+        // Without a seam it is the texel beside in the image.
+        if owned && (!last.over_seam || self.stands_for(&last.to, texel)) {
+            return End::Texel(texel);
+        }
+        // If nothing that is near will do, an owner that lies elsewhere has its island on top of this one.
+        End::Elsewhere(self.nearest(&last.to, texel, start).or(owned.then_some(texel)))
+    }
+
+    /// The texel nearest to a place on the surface, of those around one in the image that are not nearer to
+    /// `start`.
+    fn nearest(&self, place: &Place, around: u32, start: Option<Place>) -> Option<u32> {
+        let (point, cell) = (self.surface.in_space(place), self.grid.cell(around));
+        let start = start.map(|start| self.surface.in_space(&start));
+        let mut best: Option<(f64, u32)> = None;
+        for rows in -SEARCH_TEXELS..=SEARCH_TEXELS {
+            for columns in -SEARCH_TEXELS..=SEARCH_TEXELS {
+                let Some(texel) = self.grid.beside_cell(cell, [columns, rows]) else { continue };
+                let Some(other) = self.place(texel) else { continue };
+                if other.triangle != place.triangle && !self.is_near(place, texel, SEARCH_REACHES) {
+                    continue;
+                }
+                let found = self.surface.in_space(&other);
+                let distance = found.distance_squared(point);
+                if start.is_some_and(|start| found.distance_squared(start) < distance) {
+                    continue;
+                }
+                if best.is_none_or(|(least, _)| distance < least) {
+                    best = Some((distance, texel));
+                }
+            }
+        }
+        best.map(|(_, texel)| texel)
+    }
+
+    /// Whether a texel into which a place falls on the map belongs to the surface there, and not to an island
+    /// that is its neighbour only in the image.
+    fn stands_for(&self, place: &Place, texel: u32) -> bool {
+        self.owners.of(texel).is_some_and(|owner| owner == place.triangle)
+            || self.is_near(place, texel, SAME_TEXEL_REACHES)
+    }
+
+    /// Whether an owned texel lies within so many reaches of a place, in space.
+    fn is_near(&self, place: &Place, texel: u32, reaches: f64) -> bool {
+        let Some(other) = self.place(texel) else { return false };
+        let reach = self.reach[place.triangle as usize].max(self.reach[other.triangle as usize]);
+        self.surface.in_space(&other).distance(self.surface.in_space(place)) <= reach * reaches
+    }
+}

@@ -1,0 +1,322 @@
+//! What water needs to know about each texel of a map to run over the real surface.
+
+use bevy::math::{Affine3A, DVec2, Vec2, Vec3};
+
+use super::finder::Finder;
+use super::grid::Grid;
+use super::gutters::Gutters;
+use super::links::Links;
+use super::ownership::{NOBODY, Ownership};
+use super::points::front_normals;
+use super::walk::Surface;
+use crate::collision::MeshTriangles;
+use crate::overlay::{TexelAreas, Wrap};
+
+pub use super::grid::Side;
+pub use super::links::Link;
+
+/// `facing_up` of a texel that faces up.
+const STRAIGHT_UP: f32 = 127.0;
+
+/// Where the texels of a map lie in the world, and who lies beside whom on the mesh.
+///
+/// Texels are numbered row by row from v = 0. One that lies on a triangle is *owned* by it: by the first that
+/// covers its middle or, if none does, by a triangle too small to cover any middle.
+///
+/// The mesh is that of one moment: move, turn or scale it, and this must be made anew (which takes about a
+/// second for the largest map). It does not know of gaps too narrow for a texel, nor of edges that touch
+/// without sharing their corners: the mesh ends there.
+///
+/// Methods that take a texel panic if the map has no such texel.
+pub struct TexelGeometry {
+    size: u32,
+    area_mm2: Vec<f32>,
+    mean_mm2: f32,
+    /// Metres, by texel.
+    height: Vec<f32>,
+    /// By texel, 127 for 1.
+    facing_up: Vec<i8>,
+    /// Triangle or [`NOBODY`], by texel.
+    owner: Vec<u32>,
+    links: Links,
+    gutters: Gutters,
+    /// A tile, and another with texels that show what the first one holds; ascending.
+    gutter_tiles: Vec<(u32, u32)>,
+    /// Length of a texel along u and v, metres, by triangle.
+    lengths: Vec<[f32; 2]>,
+    /// Length of a mean texel, for those without a triangle.
+    mean_length: f32,
+}
+
+impl TexelGeometry {
+    /// Measures a mesh that stands in the world by `world_from_mesh`, for a map of `size` x `size` texels.
+    /// `up` is where water comes from, of any length above 0.
+    pub fn new(
+        triangles: &MeshTriangles,
+        world_from_mesh: &Affine3A,
+        up: Vec3,
+        size: u32,
+        wrap: [Wrap; 2],
+    ) -> Self {
+        let up = up.normalize_or(Vec3::Y);
+        let grid = Grid { size, wrap };
+        let areas = TexelAreas::new(triangles, world_from_mesh, size, wrap);
+        let surface = Surface::new(triangles, world_from_mesh, grid);
+        let owners = Ownership::new(triangles, grid);
+        let finder = Finder::new(grid, &surface, &owners);
+        let (links, gutters) = (Links::new(&finder), Gutters::new(&finder));
+        let height = heights(&finder, up);
+        let facing: Vec<i8> = front_normals(triangles, world_from_mesh)
+            .iter()
+            .map(|normal| (normal.dot(up).clamp(-1.0, 1.0) * STRAIGHT_UP).round() as i8)
+            .collect();
+        let facing_up =
+            owners.triangle.iter().map(|&owner| facing.get(owner as usize).copied().unwrap_or(0)).collect();
+        let mean_length = positive_or(areas.mean_mm2.sqrt() * 1e-3, 1e-3);
+        let lengths = (0..surface.map.len() as u32).map(|triangle| {
+            [DVec2::X, DVec2::Y].map(|step| {
+                let length = surface.step_in_space(triangle, step).map_or(0.0, |step| step.length() as f32);
+                positive_or(length, mean_length)
+            })
+        });
+        Self {
+            size,
+            lengths: lengths.collect(),
+            area_mm2: areas.mm2,
+            mean_mm2: areas.mean_mm2,
+            height,
+            facing_up,
+            gutter_tiles: gutters.tiles(size),
+            links,
+            gutters,
+            mean_length,
+            owner: owners.triangle,
+        }
+    }
+
+    /// Texels along each side of the map.
+    pub fn size(&self) -> u32 {
+        self.size
+    }
+
+    /// World area that each texel stands for, mm²; the values of [`TexelAreas`]. 0 where nothing lies.
+    pub fn area_mm2(&self) -> &[f32] {
+        &self.area_mm2
+    }
+
+    /// Mean area of the texels that stand for anything, mm².
+    pub fn mean_mm2(&self) -> f32 {
+        self.mean_mm2
+    }
+
+    /// How high each texel's middle lies above the lowest of the surface, metres along `up`. 0 where nothing
+    /// lies.
+    pub fn height(&self) -> &[f32] {
+        &self.height
+    }
+
+    /// Cosine of the angle between up and the front of a texel's triangle, -1..=1 in steps of 1/127: 1 on a
+    /// floor, 0 on a wall, -1 on a ceiling. 0 where nothing lies.
+    #[inline]
+    pub fn facing_up(&self, texel: u32) -> f32 {
+        f32::from(self.facing_up[texel as usize]) / STRAIGHT_UP
+    }
+
+    /// The triangle that a texel lies on, an index into the lists of [`MeshTriangles`].
+    #[inline]
+    pub fn owner(&self, texel: u32) -> Option<u32> {
+        Some(self.owner[texel as usize]).filter(|&owner| owner != NOBODY)
+    }
+
+    /// What lies on a side of a texel on the mesh, over seams between islands, too. [`Link::Edge`] where the
+    /// mesh ends, and on all sides of a texel on which nothing lies.
+    ///
+    /// Links mostly lead back on the opposite side. Over a seam, where islands may be turned and scaled, they
+    /// may lead back on another side or to a texel beside.
+    #[inline]
+    pub fn link(&self, texel: u32, side: Side) -> Link {
+        self.links.get(texel, side)
+    }
+
+    /// Metres on the surface from a texel's middle to that of its neighbour in the image, by the density of
+    /// the texel's own triangle; above 0.
+    #[inline]
+    pub fn distance(&self, texel: u32, side: Side) -> f32 {
+        let lengths = self.lengths.get(self.owner[texel as usize] as usize);
+        lengths.map_or(self.mean_length, |lengths| lengths[side.axis()])
+    }
+
+    /// The texel that stands for the surface at this one: itself if a triangle owns it; else, up to 8 texels
+    /// off an island (columns plus rows), the one that a way over the mesh straight across the island's
+    /// border leads to. Where the mesh ends at that border, the texel of the border. None further out.
+    pub fn stand_in(&self, texel: u32) -> Option<u32> {
+        self.owner(texel).map(|_| texel).or_else(|| self.gutters.stand_in(texel))
+    }
+
+    /// For a texel that nobody owns but that lies within 2 columns and 2 rows of one that somebody does: the
+    /// nearest such texel in the image. None for all others.
+    pub fn gutter_source(&self, texel: u32) -> Option<u32> {
+        self.gutters.source(texel)
+    }
+
+    /// Adds the tiles that show anything of these, beyond their own texels.
+    pub(super) fn add_gutter_tiles(&self, tiles: &mut Vec<u32>) {
+        for index in 0..tiles.len() {
+            let own = tiles[index];
+            let from = self.gutter_tiles.partition_point(|&(tile, _)| tile < own);
+            let showing = self.gutter_tiles[from..].iter().take_while(|&&(tile, _)| tile == own);
+            tiles.extend(showing.map(|&(_, other)| other));
+        }
+    }
+
+    /// Where a texel's middle lies in the world, and the normal of its triangle; None if nothing lies there.
+    /// `triangles` and `world_from_mesh` as in [`Self::new`]; if the mesh has moved since, where it is now.
+    pub fn point(
+        &self,
+        texel: u32,
+        triangles: &MeshTriangles,
+        world_from_mesh: &Affine3A,
+    ) -> Option<(Vec3, Vec3)> {
+        let owner = self.owner(texel)? as usize;
+        let [a, b, c] = triangles.positions[owner].map(|corner| world_from_mesh.transform_point3(corner));
+        let [uv_a, uv_b, uv_c] = triangles.uvs[owner];
+        let middle = Vec2::new((texel % self.size) as f32 + 0.5, (texel / self.size) as f32 + 0.5);
+        let center = (uv_a + uv_b + uv_c) / 3.0;
+        // The copy of the map that the triangle lies in.
+        let uv = middle / self.size as f32;
+        let uv = uv + (center - uv).round();
+        let (ab, ac, at) = (uv_b - uv_a, uv_c - uv_a, uv - uv_a);
+        let area = ab.perp_dot(ac);
+        let inside = |part: f32| if part.is_finite() { part.clamp(0.0, 1.0) } else { 1.0 / 3.0 };
+        let (to_b, to_c) = (inside(at.perp_dot(ac) / area), inside(ab.perp_dot(at) / area));
+        let normal =
+            (b - a).cross(c - a).normalize_or(Vec3::Y) * world_from_mesh.matrix3.determinant().signum();
+        Some((a + (b - a) * to_b + (c - a) * to_c, normal))
+    }
+
+    /// Memory held, bytes.
+    pub fn bytes(&self) -> usize {
+        (self.area_mm2.capacity() + self.height.capacity()) * size_of::<f32>()
+            + self.facing_up.capacity()
+            + self.owner.capacity() * size_of::<u32>()
+            + self.lengths.capacity() * size_of::<[f32; 2]>()
+            + self.links.bytes()
+            + self.gutters.bytes()
+    }
+}
+
+/// Heights of the texels above the lowest.
+fn heights(finder: &Finder, up: Vec3) -> Vec<f32> {
+    let above_origin = |texel: u32| {
+        finder.place(texel).map(|place| finder.surface.in_space(&place).dot(up.as_dvec3()) as f32)
+    };
+    let texels = finder.grid.texels() as u32;
+    let mut heights: Vec<f32> = (0..texels).map(|texel| above_origin(texel).unwrap_or(f32::NAN)).collect();
+    // The minimum of a number and NaN is the number.
+    let lowest = heights.iter().copied().fold(f32::INFINITY, f32::min);
+    for height in &mut heights {
+        *height = if height.is_nan() { 0.0 } else { *height - lowest };
+    }
+    heights
+}
+
+/// A length if it is one, else `other`.
+fn positive_or(length: f32, other: f32) -> f32 {
+    if length.is_finite() && length > 0.0 { length } else { other }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::points::surface_points;
+    use super::super::test_meshes::{Cube, cylinder, floor, joined, sheet};
+    use super::*;
+
+    const REPEAT: [Wrap; 2] = [Wrap::Repeat; 2];
+    const SLOPE: f32 = std::f32::consts::FRAC_PI_6;
+
+    /// 2 m x 2 m, sloped by 30 degrees: v goes down.
+    fn slope(cells: u32) -> MeshTriangles {
+        sheet(cells, |point| floor(point) * 2.0 - Vec3::Y * 2.0 * SLOPE.tan() * point.y, |point| point)
+    }
+
+    #[test]
+    fn heights_and_distances_are_those_of_the_slope() {
+        let far = Affine3A::from_translation(Vec3::new(1e4, -2e3, 5.0));
+        for (cells, place) in [(1, Affine3A::IDENTITY), (5, far)] {
+            let geometry = TexelGeometry::new(&slope(cells), &place, Vec3::Y * 3.0, 32, REPEAT);
+            assert_eq!(geometry.size(), 32);
+            let step = 2.0 / 32.0;
+            for texel in 0..32 * 32 {
+                let height = (31 - texel / 32) as f32 * step * SLOPE.tan();
+                assert!((geometry.height()[texel as usize] - height).abs() < 1e-5, "{texel}");
+                assert!((geometry.facing_up(texel) + SLOPE.cos()).abs() < 0.005);
+                for (side, expected) in
+                    Side::ALL.into_iter().zip([1.0, 1.0, 1.0 / SLOPE.cos(), 1.0 / SLOPE.cos()])
+                {
+                    let distance = geometry.distance(texel, side);
+                    assert!((distance - expected * step).abs() < 1e-5, "{texel} {side:?} {distance}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn scale_and_mirrors_count() {
+        let mirrored = Affine3A::from_scale(Vec3::new(-3.0, 1.0, 0.5));
+        let plain = TexelGeometry::new(&slope(4), &Affine3A::IDENTITY, Vec3::Y, 32, REPEAT);
+        let scaled = TexelGeometry::new(&slope(4), &mirrored, Vec3::Y, 32, REPEAT);
+        for texel in 0..32 * 32 {
+            let height = |geometry: &TexelGeometry| geometry.height()[texel as usize];
+            assert!((height(&plain) - height(&scaled)).abs() < 1e-5);
+            assert!(scaled.facing_up(texel) < -0.5, "a mirror does not turn the front round");
+            let along_u = scaled.distance(texel, Side::PlusU) / plain.distance(texel, Side::PlusU);
+            assert!((along_u - 3.0).abs() < 1e-3);
+            assert!(Side::ALL.into_iter().all(|side| plain.link(texel, side) == scaled.link(texel, side)));
+        }
+        let sideways = TexelGeometry::new(&slope(4), &Affine3A::IDENTITY, Vec3::X, 32, REPEAT);
+        assert!((sideways.height()[31] - 31.0 * 2.0 / 32.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn areas_are_those_of_the_texels_and_so_are_the_owners() {
+        let cube = Cube { cells: 3, size: 64, island: 15.3, first: 2.2, pitch: 20.0, turned: true };
+        let small = sheet(90, floor, |point| point * 0.9);
+        let tiled = sheet(5, floor, |point| point * 3.0 - Vec2::splat(1.2));
+        for mesh in [cube.mesh(), cylinder(12), small, tiled] {
+            for wrap in [REPEAT, [Wrap::Clamp; 2]] {
+                let geometry = TexelGeometry::new(&mesh, &Affine3A::IDENTITY, Vec3::Y, 64, wrap);
+                let areas = TexelAreas::new(&mesh, &Affine3A::IDENTITY, 64, wrap);
+                assert_eq!(geometry.area_mm2(), areas.mm2);
+                assert_eq!(geometry.mean_mm2(), areas.mean_mm2);
+                let points = surface_points(&mesh, &Affine3A::IDENTITY, 64, wrap);
+                let mut points = points.iter().peekable();
+                for texel in 0..64 * 64 {
+                    let owner = geometry.owner(texel);
+                    assert_eq!(owner.is_some(), geometry.area_mm2()[texel as usize] > 0.0, "{texel}");
+                    let point = points.next_if(|point| point.texel == texel);
+                    assert_eq!(point.map(|point| point.triangle), owner);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_and_nonsense_are_measured() {
+        let nothing = TexelGeometry::new(&MeshTriangles::default(), &Affine3A::IDENTITY, Vec3::Y, 16, REPEAT);
+        assert_eq!((nothing.owner(5), nothing.stand_in(5), nothing.facing_up(5)), (None, None, 0.0));
+        assert_eq!(nothing.link(5, Side::PlusU), Link::Edge);
+        let point = sheet(2, floor, |_| Vec2::splat(0.4));
+        let huge = sheet(2, floor, |point| point * -1e9);
+        let mesh = joined([point, huge, cylinder(5)]);
+        let flat = Affine3A::from_scale(Vec3::new(1.0, 0.0, 1.0));
+        for place in [Affine3A::IDENTITY, flat, Affine3A::from_scale(Vec3::ZERO)] {
+            let geometry = TexelGeometry::new(&mesh, &place, Vec3::ZERO, 32, [Wrap::Repeat, Wrap::Clamp]);
+            assert!(geometry.bytes() >= 32 * 32 * 14);
+            for texel in 0..32 * 32 {
+                let distances = Side::ALL.map(|side| geometry.distance(texel, side));
+                assert!(distances.iter().all(|&distance| distance > 0.0 && distance.is_finite()));
+                assert!(geometry.height()[texel as usize] >= 0.0);
+            }
+        }
+    }
+}

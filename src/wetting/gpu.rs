@@ -1,0 +1,252 @@
+//! Water on its way to be drawn: the tiles that changed, and nothing else.
+//!
+//! The shader works out what a texel holds at the moment it is drawn, so only what was *moved* has to be sent: a surface at
+//! rest sends nothing, however fast it dries. Texels are packed as depths, 16 bytes each, tile after tile, so that a tile is
+//! one piece of the buffer. Texels beside an island show what the nearest one on it holds, so that no dry seam is seen where
+//! the shader blends across the border.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use bevy::asset::RenderAssetUsages;
+use bevy::ecs::entity::EntityHashMap;
+use bevy::prelude::*;
+use bevy::render::render_asset::RenderAssets;
+use bevy::render::renderer::RenderQueue;
+use bevy::render::storage::{GpuShaderBuffer, ShaderBuffer};
+use bevy::render::{ExtractSchedule, MainWorld, Render, RenderApp, RenderSystems};
+use bytemuck::{Pod, Zeroable};
+use half::f16;
+
+use super::surface::Tiles;
+use super::{Exposure, Marks, SurfaceWater, Units, WetGeometry};
+use crate::overlay::{Overlays, TILE_SIZE};
+
+/// A texel as the shader reads it: `TexelWater` in `shaders/common/wet_map.wgsl` has the same fields.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
+pub struct GpuTexelWater {
+    /// Film (low) and absorbed water, mm, as two `f16`.
+    pub amounts: u32,
+    /// Reference tick; 0 if it never was wet.
+    pub tick: u32,
+    /// From the lowest byte: how wet it looked then, exposure to air, exposure to the sun, reserve.
+    pub bytes: u32,
+    /// From the lowest byte: efflorescence, tide mark; the rest is 0.
+    pub marks: u32,
+}
+
+/// Bytes of a tile.
+const TILE_BYTES: usize = (TILE_SIZE * TILE_SIZE) as usize * size_of::<GpuTexelWater>();
+
+/// Sends changed tiles to the GPU. Does nothing without a render app.
+pub struct WaterUploadPlugin;
+
+impl Plugin for WaterUploadPlugin {
+    fn build(&self, app: &mut App) {
+        if app.get_sub_app(RenderApp).is_none() {
+            return;
+        }
+        let stats = UploadStats::default();
+        app.insert_resource(stats.clone()).add_systems(
+            PostUpdate,
+            pack_tiles.in_set(PackWater).after(crate::overlay::deposit::note_traces),
+        );
+        let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
+        render_app
+            .insert_resource(stats)
+            .init_resource::<PendingTiles>()
+            .add_systems(ExtractSchedule, extract_tiles)
+            .add_systems(Render, write_tiles.in_set(RenderSystems::PrepareResources));
+    }
+}
+
+/// In `PostUpdate`: water is made ready to be drawn.
+#[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct PackWater;
+
+/// What has been sent since the start; the same numbers in the main and in the render world.
+#[derive(Resource, Clone, Default)]
+pub struct UploadStats(Arc<[AtomicU64; 2]>);
+
+impl UploadStats {
+    /// Tiles sent.
+    pub fn tiles(&self) -> u64 {
+        self.0[0].load(Ordering::Relaxed)
+    }
+
+    /// Writes: one for each row of tiles that changed side by side.
+    pub fn writes(&self) -> u64 {
+        self.0[1].load(Ordering::Relaxed)
+    }
+}
+
+/// Packed tiles of a surface.
+#[derive(Component, Default)]
+pub(super) struct PackedTiles {
+    tiles: Vec<u32>,
+    texels: Vec<GpuTexelWater>,
+}
+
+/// Packs what changed, and makes room on the GPU for a surface's first water.
+fn pack_tiles(
+    mut commands: Commands,
+    mut buffers: ResMut<Assets<ShaderBuffer>>,
+    mut surfaces: Query<
+        (Entity, &mut SurfaceWater, &WetGeometry, Option<&Exposure>, &mut Overlays, Option<&mut PackedTiles>),
+        Or<(Changed<SurfaceWater>, Changed<Overlays>)>,
+    >,
+) {
+    for (entity, mut water, geometry, exposure, mut overlays, packed) in &mut surfaces {
+        if !water.is_wet() || overlays.size != water.size {
+            continue;
+        }
+        let water = water.bypass_change_detection();
+        if !overlays.has_room {
+            let bytes = water.texels.len() * size_of::<GpuTexelWater>();
+            overlays.state = buffers.add(ShaderBuffer::with_size(bytes, RenderAssetUsages::RENDER_WORLD));
+            overlays.has_room = true;
+            // All that was sent before is gone with the old buffer.
+            for tile in 0..water.tiles.flags.len() as u32 {
+                if water.tiles.has(tile, Tiles::WET) {
+                    water.tiles.touch(tile);
+                }
+            }
+        }
+        if water.tiles.dirty.is_empty() {
+            continue;
+        }
+        let mut fresh = PackedTiles::default();
+        let is_new = packed.is_none();
+        let mut packed = packed;
+        let target = packed.as_deref_mut().unwrap_or(&mut fresh);
+        let mut dirty = std::mem::take(&mut water.tiles.dirty);
+        geometry.0.add_gutter_tiles(&mut dirty);
+        dirty.sort_unstable();
+        dirty.dedup();
+        for &tile in &dirty {
+            water.tiles.flags[tile as usize] &= !Tiles::DIRTY;
+            target.tiles.push(tile);
+            pack_tile(water, &geometry.0, exposure, tile, &mut target.texels);
+        }
+        dirty.clear();
+        water.tiles.dirty = dirty;
+        if is_new {
+            commands.entity(entity).insert(fresh);
+        }
+    }
+}
+
+fn pack_tile(
+    water: &SurfaceWater,
+    geometry: &super::TexelGeometry,
+    exposure: Option<&Exposure>,
+    tile: u32,
+    texels: &mut Vec<GpuTexelWater>,
+) {
+    let across = water.size / TILE_SIZE;
+    let origin = (tile / across * TILE_SIZE) * water.size + tile % across * TILE_SIZE;
+    for y in 0..TILE_SIZE {
+        for x in 0..TILE_SIZE {
+            let texel = origin + y * water.size + x;
+            let shown = geometry.gutter_source(texel).unwrap_or(texel);
+            texels.push(pack_texel(water, geometry, exposure, shown));
+        }
+    }
+}
+
+/// A texel as it is drawn.
+pub(super) fn pack_texel(
+    water: &SurfaceWater,
+    geometry: &super::TexelGeometry,
+    exposure: Option<&Exposure>,
+    texel: u32,
+) -> GpuTexelWater {
+    let state = &water.texels[texel as usize];
+    let marks = water.marks.get(texel as usize).copied().unwrap_or_default();
+    let Marks { efflorescence, tide } = marks;
+    let byte = |part: f32| (part * 255.0).round().clamp(0.0, 255.0) as u8;
+    let marks = u32::from_le_bytes([byte(efflorescence), byte(tide), 0, 0]);
+    if state.is_dry() {
+        return GpuTexelWater { marks, ..default() };
+    }
+    let area = geometry.area_mm2()[texel as usize];
+    let unit_mm = Units::mm_on(water.units, if area > 0.0 { area } else { geometry.mean_mm2().max(1e-6) });
+    let depth = |units: u32| u32::from(f16::from_f64((f64::from(units) * unit_mm).min(60_000.0)).to_bits());
+    let [air, sun] = exposure.map_or(Exposure::FREE, |exposure| exposure.bytes_at(texel));
+    GpuTexelWater {
+        amounts: depth(state.film) | depth(state.pores) << 16,
+        tick: state.tick,
+        bytes: u32::from_le_bytes([state.shown, air, sun, state.reserve]),
+        marks,
+    }
+}
+
+/// Tiles in the render world that are not written yet, by surface.
+#[derive(Resource, Default)]
+struct PendingTiles {
+    surfaces: EntityHashMap<Pending>,
+}
+
+struct Pending {
+    buffer: AssetId<ShaderBuffer>,
+    tiles: Vec<u32>,
+    texels: Vec<GpuTexelWater>,
+}
+
+/// Moves packed tiles into the render world, each once.
+fn extract_tiles(
+    mut main_world: ResMut<MainWorld>,
+    mut pending: ResMut<PendingTiles>,
+    mut query: Local<Option<QueryState<(Entity, &'static Overlays, &'static mut PackedTiles)>>>,
+) {
+    let query = query.get_or_insert_with(|| main_world.query());
+    for (entity, overlays, mut packed) in query.iter_mut(&mut main_world) {
+        let packed = packed.bypass_change_detection();
+        if packed.tiles.is_empty() {
+            continue;
+        }
+        let buffer = overlays.state.id();
+        let waiting = pending.surfaces.entry(entity).or_insert(Pending {
+            buffer,
+            tiles: Vec::new(),
+            texels: Vec::new(),
+        });
+        if waiting.buffer != buffer {
+            // Meant for maps that are gone.
+            waiting.buffer = buffer;
+            waiting.tiles.clear();
+            waiting.texels.clear();
+        }
+        waiting.tiles.append(&mut packed.tiles);
+        waiting.texels.append(&mut packed.texels);
+    }
+    pending.surfaces.retain(|entity, _| main_world.get_entity(*entity).is_ok());
+}
+
+/// Writes tiles into their buffers; neighbours in one go. The order of surfaces does not matter: each has its own.
+fn write_tiles(
+    mut pending: ResMut<PendingTiles>,
+    buffers: Res<RenderAssets<GpuShaderBuffer>>,
+    queue: Res<RenderQueue>,
+    stats: Res<UploadStats>,
+) {
+    for waiting in pending.surfaces.values_mut().filter(|waiting| !waiting.tiles.is_empty()) {
+        let Some(buffer) = buffers.get(waiting.buffer) else { continue };
+        let bytes: &[u8] = bytemuck::cast_slice(&waiting.texels);
+        let mut first = 0;
+        while first < waiting.tiles.len() {
+            let mut end = first + 1;
+            while end < waiting.tiles.len() && waiting.tiles[end] == waiting.tiles[end - 1] + 1 {
+                end += 1;
+            }
+            let offset = u64::from(waiting.tiles[first]) * TILE_BYTES as u64;
+            queue.write_buffer(&buffer.buffer, offset, &bytes[first * TILE_BYTES..end * TILE_BYTES]);
+            stats.0[1].fetch_add(1, Ordering::Relaxed);
+            first = end;
+        }
+        stats.0[0].fetch_add(waiting.tiles.len() as u64, Ordering::Relaxed);
+        waiting.tiles.clear();
+        waiting.texels.clear();
+    }
+}

@@ -1,0 +1,99 @@
+//! Surfaces learn their shape, texel by texel, in the background.
+
+use std::sync::Arc;
+
+use bevy::math::Mat3A;
+use bevy::prelude::*;
+use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+
+use super::{Dripping, DropQueue, Exposure, SurfaceWater, TexelGeometry};
+use crate::collision::{MeshBvh, SurfaceCollider};
+use crate::overlay::{TexelAreas, Weatherable, Wrap};
+
+/// The shape of a surface's texels, and which lie beside each other. Comes some frames after its collider.
+#[derive(Component, Clone)]
+pub struct WetGeometry(pub Arc<TexelGeometry>);
+
+/// What a geometry was, or is being, measured from.
+#[derive(Component)]
+pub(super) struct Measured {
+    size: u32,
+    wrap: [Wrap; 2],
+    bvh: Arc<MeshBvh>,
+    /// Turn and scale; where it stands does not matter.
+    matrix: Mat3A,
+    task: Option<Task<TexelGeometry>>,
+}
+
+impl Measured {
+    fn is_of(&self, surface: &Weatherable, collider: &SurfaceCollider, transform: &GlobalTransform) -> bool {
+        let matrix = transform.affine().matrix3;
+        let scale = self.matrix.determinant().abs().cbrt().max(1e-12);
+        // A degree or two of turning changes nothing worth measuring again.
+        let turned = (0..3).any(|axis| (self.matrix.col(axis) - matrix.col(axis)).length() > 0.03 * scale);
+        !turned
+            && (self.size, self.wrap) == (surface.texels(), surface.wrap())
+            && Arc::ptr_eq(&self.bvh, &collider.0)
+    }
+}
+
+type Measurable = (
+    Entity,
+    &'static Weatherable,
+    &'static SurfaceCollider,
+    &'static TexelAreas,
+    &'static GlobalTransform,
+    Option<&'static mut Measured>,
+    Option<&'static mut SurfaceWater>,
+);
+
+/// Measures new surfaces, and those that change their shape, map size or how they stand.
+pub(super) fn measure_surfaces(
+    mut commands: Commands,
+    mut surfaces: Query<
+        Measurable,
+        Or<(Without<WetGeometry>, Changed<GlobalTransform>, Changed<Weatherable>, Changed<SurfaceCollider>)>,
+    >,
+    mut measuring: Query<(Entity, &mut Measured, &Weatherable, &TexelAreas, Option<&mut SurfaceWater>)>,
+) {
+    for (entity, surface, collider, areas, transform, measured, water) in &mut surfaces {
+        if measured.is_some_and(|measured| measured.is_of(surface, collider, transform)) {
+            continue;
+        }
+        let (size, wrap) = (surface.texels(), surface.wrap());
+        if let Some(mut water) = water
+            && (water.size, water.wrap) != (size, wrap)
+        {
+            // What was on the old maps is gone with them.
+            let generation = water.generation + 1;
+            *water = SurfaceWater::new(surface, areas.mean_mm2);
+            water.generation = generation;
+            commands.entity(entity).remove::<(WetGeometry, Exposure)>();
+        }
+        let affine = transform.affine();
+        let bvh = collider.0.clone();
+        let triangles = bvh.clone();
+        let task = AsyncComputeTaskPool::get().spawn(async move {
+            TexelGeometry::new(triangles.triangles(), &affine, Vec3::Y, size, wrap)
+        });
+        let matrix = affine.matrix3;
+        commands.entity(entity).insert(Measured { size, wrap, bvh, matrix, task: Some(task) });
+    }
+    for (entity, mut measured, surface, areas, water) in &mut measuring {
+        let Some(task) = &mut measured.task else { continue };
+        let Some(geometry) = check_ready(task) else { continue };
+        measured.task = None;
+        let mut entity = commands.entity(entity);
+        entity.insert(WetGeometry(Arc::new(geometry))).remove::<Exposure>();
+        if water.is_none() {
+            entity.insert(SurfaceWater::new(surface, areas.mean_mm2));
+        }
+    }
+}
+
+/// A surface that is not [`Weatherable`] any more is not wet any more.
+pub(super) fn release_surface(removed: On<Remove, Weatherable>, mut commands: Commands) {
+    commands
+        .entity(removed.entity)
+        .try_remove::<(WetGeometry, Measured, SurfaceWater, Exposure, DropQueue, Dripping)>();
+}

@@ -1,0 +1,329 @@
+//! The water of one surface: its texels, which tiles of them are busy, and what has become of it.
+
+use bevy::prelude::*;
+
+use super::evolve::{Amounts, Matter, evolve};
+use super::look::{WaterLook, water_look};
+use super::texel::{Scale, TexelWater, Units};
+use super::{Exposure, Marks, TexelGeometry};
+use crate::material::PorousMaterial;
+use crate::overlay::{TILE_SIZE, Weatherable, Wrap};
+use crate::weather::{Demand, DryingClock};
+
+/// All water in and on a surface. Beside [`Weatherable`](crate::overlay::Weatherable); empty until the first water comes.
+#[derive(Component, Debug, Clone)]
+pub struct SurfaceWater {
+    /// Texels along each side.
+    pub(crate) size: u32,
+    pub(crate) wrap: [Wrap; 2],
+    pub(crate) units: Units,
+    /// Row by row; empty while it has never been wet.
+    pub(crate) texels: Vec<TexelWater>,
+    /// What drying left behind; empty unless the material asks for it.
+    pub(crate) marks: Vec<Marks>,
+    pub(crate) tiles: Tiles,
+    pub(crate) ledger: Ledger,
+    /// Tick of the last water from outside; 0 for none since the rim was measured.
+    pub(crate) rained_at: u32,
+    /// Goes up whenever it begins anew.
+    pub(crate) generation: u32,
+}
+
+/// What has become of the water of a surface; units.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Ledger {
+    /// Came with particles.
+    pub received: u64,
+    /// Evaporated, as far as it is booked: what evaporates at rest is booked when a texel is next touched.
+    pub evaporated: u64,
+    /// Left as drips.
+    pub dripped: u64,
+    /// Ran off beyond what a texel can hold.
+    pub spilled: u64,
+}
+
+/// Which tiles have something to do. One byte of flags for each, and lists of those that are set, in ascending order
+/// whenever they are read.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Tiles {
+    pub(crate) flags: Vec<u8>,
+    /// Films that may run.
+    pub(crate) running: Vec<u32>,
+    /// Pores that may share what they hold.
+    pub(crate) spreading: Vec<u32>,
+    /// Changed since they were last sent to be drawn.
+    pub(crate) dirty: Vec<u32>,
+}
+
+impl Tiles {
+    pub(crate) const RUNNING: u8 = 1;
+    pub(crate) const SPREADING: u8 = 2;
+    pub(crate) const DIRTY: u8 = 4;
+    /// Has a film that is free to move, but nowhere to go.
+    pub(crate) const POOL: u8 = 8;
+    /// Has ever held water.
+    pub(crate) const WET: u8 = 16;
+
+    fn set(list: &mut Vec<u32>, flags: &mut u8, flag: u8, tile: u32) {
+        if *flags & flag == 0 {
+            *flags |= flag;
+            list.push(tile);
+        }
+    }
+
+    pub(crate) fn run(&mut self, tile: u32) {
+        Self::set(&mut self.running, &mut self.flags[tile as usize], Self::RUNNING, tile);
+    }
+
+    pub(crate) fn spread(&mut self, tile: u32) {
+        Self::set(&mut self.spreading, &mut self.flags[tile as usize], Self::SPREADING, tile);
+    }
+
+    pub(crate) fn touch(&mut self, tile: u32) {
+        self.flags[tile as usize] |= Self::WET;
+        Self::set(&mut self.dirty, &mut self.flags[tile as usize], Self::DIRTY, tile);
+    }
+
+    pub(crate) fn has(&self, tile: u32, flag: u8) -> bool {
+        self.flags[tile as usize] & flag != 0
+    }
+}
+
+/// What a surface's texels are asked with: its material, its exposure, and the time.
+pub(crate) struct Now<'a> {
+    pub(crate) tick: u32,
+    pub(crate) hz: u32,
+    pub(crate) drying: &'a DryingClock,
+    pub(crate) demand: Demand,
+    pub(crate) geometry: &'a TexelGeometry,
+    pub(crate) exposure: Option<&'a Exposure>,
+    pub(crate) material: &'a PorousMaterial,
+    pub(crate) matter: Matter,
+}
+
+impl<'a> Now<'a> {
+    pub(crate) fn new(
+        tick: u32,
+        hz: u32,
+        drying: &'a DryingClock,
+        geometry: &'a TexelGeometry,
+        exposure: Option<&'a Exposure>,
+        material: &'a PorousMaterial,
+    ) -> Self {
+        let matter = material.matter();
+        Self { tick, hz, drying, demand: drying.until(tick), geometry, exposure, material, matter }
+    }
+
+    /// Constants of a texel.
+    pub(crate) fn scale(&self, units: Units, texel: u32) -> Scale {
+        let area = self.geometry.area_mm2()[texel as usize];
+        // Where nothing lies, a texel counts as one of mean size.
+        let area = if area > 0.0 { area } else { self.geometry.mean_mm2() };
+        Scale { unit_mm: units.mm_on(area.max(1e-6)), reserve_mm: self.material.reserve_mm() }
+    }
+
+    /// What a texel holds now, as depths.
+    pub(crate) fn amounts(&self, scale: &Scale, texel: u32, water: &TexelWater) -> Amounts {
+        let before = scale.amounts(water);
+        if water.tick >= self.tick {
+            return before;
+        }
+        let seconds = f64::from(self.tick - water.tick) / f64::from(self.hz);
+        let (air, sun) = self.exposure.map_or((1.0, 0.0), |exposure| exposure.at(texel));
+        let demand = (self.demand - self.drying.until(water.tick)).at(air, sun);
+        evolve(before, self.matter, seconds, demand)
+    }
+
+    /// How what it holds looks now.
+    pub(crate) fn look(&self, amounts: &Amounts, water: &TexelWater) -> WaterLook {
+        let seconds = f64::from(self.tick.saturating_sub(water.tick)) / f64::from(self.hz);
+        let shown = f64::from(water.shown) / 255.0;
+        let fill = f64::from(self.material.t_fill);
+        water_look(amounts.pores_mm, self.material.seen_mm(), shown, seconds, fill)
+    }
+}
+
+impl SurfaceWater {
+    /// Dry maps for a surface whose texels have this mean area, mm².
+    pub fn new(surface: &Weatherable, mean_mm2: f32) -> Self {
+        Self {
+            size: surface.texels(),
+            wrap: surface.wrap(),
+            units: Units::for_area(mean_mm2),
+            texels: Vec::new(),
+            marks: Vec::new(),
+            tiles: Tiles::default(),
+            ledger: Ledger::default(),
+            rained_at: 0,
+            generation: 0,
+        }
+    }
+
+    /// Texels along each side.
+    pub fn size(&self) -> u32 {
+        self.size
+    }
+
+    /// The texels, row by row; empty while it has never been wet.
+    pub fn texels(&self) -> &[TexelWater] {
+        &self.texels
+    }
+
+    /// What drying left behind, row by row; empty unless the material asks for it.
+    pub fn marks(&self) -> &[Marks] {
+        &self.marks
+    }
+
+    /// What a unit of its volumes is.
+    pub fn units(&self) -> Units {
+        self.units
+    }
+
+    /// What has become of its water.
+    pub fn ledger(&self) -> Ledger {
+        self.ledger
+    }
+
+    /// Whether nothing runs or spreads: then it costs nothing.
+    pub fn is_at_rest(&self) -> bool {
+        self.tiles.running.is_empty() && self.tiles.spreading.is_empty()
+    }
+
+    /// Whether water has ever come.
+    pub fn is_wet(&self) -> bool {
+        !self.texels.is_empty()
+    }
+
+    /// Bytes it holds: state, and flags of tiles.
+    pub fn bytes(&self) -> usize {
+        self.texels.capacity() * size_of::<TexelWater>()
+            + self.marks.capacity() * size_of::<Marks>()
+            + self.tiles.flags.capacity()
+    }
+
+    /// Covers all of the surface with water, beside what it has: film and absorbed, mm. It has been there for so long that
+    /// it is seen at once.
+    pub fn cover(&mut self, geometry: &TexelGeometry, film_mm: f32, absorbed_mm: f32, tick: u32) {
+        self.wake(false);
+        let tick = tick.max(1);
+        for texel in 0..self.texels.len() as u32 {
+            let area = geometry.area_mm2()[texel as usize];
+            if area <= 0.0 {
+                continue;
+            }
+            let units = |mm: f32| (f64::from(mm.max(0.0)) / self.units.mm_on(area)).round() as u32;
+            let water = &mut self.texels[texel as usize];
+            let before = water.total();
+            water.film = water.film.saturating_add(units(film_mm));
+            water.pores = water.pores.saturating_add(units(absorbed_mm));
+            (water.tick, water.shown) = (tick, u8::MAX);
+            self.ledger.received += water.total() - before;
+        }
+        for tile in 0..self.tiles.flags.len() as u32 {
+            self.tiles.touch(tile);
+            self.tiles.run(tile);
+            self.tiles.spread(tile);
+        }
+        self.rained_at = tick;
+    }
+
+    /// Makes room for the first water.
+    pub(crate) fn wake(&mut self, marks: bool) {
+        if self.texels.is_empty() {
+            self.texels = vec![TexelWater::default(); (self.size * self.size) as usize];
+            self.tiles.flags = vec![0; (self.size / TILE_SIZE).pow(2) as usize];
+        }
+        if marks && self.marks.is_empty() {
+            self.marks = vec![Marks::default(); self.texels.len()];
+        }
+    }
+
+    /// Dry again, as on the first day.
+    pub(crate) fn reset(&mut self) {
+        let generation = self.generation + 1;
+        self.texels.clear();
+        self.marks.clear();
+        self.tiles = Tiles::default();
+        self.ledger = Ledger::default();
+        self.rained_at = 0;
+        self.generation = generation;
+    }
+
+    /// The tile of a texel.
+    pub(crate) fn tile_of(&self, texel: u32) -> u32 {
+        let (x, y) = (texel % self.size, texel / self.size);
+        (y / TILE_SIZE) * (self.size / TILE_SIZE) + x / TILE_SIZE
+    }
+
+    /// Brings a texel to the present and returns what it holds.
+    pub(crate) fn settle(&mut self, now: &Now, texel: u32) -> Amounts {
+        let scale = now.scale(self.units, texel);
+        let water = &mut self.texels[texel as usize];
+        if water.tick >= now.tick {
+            return scale.amounts(water);
+        }
+        if water.is_dry() {
+            (water.tick, water.shown) = (now.tick, 0);
+            return Amounts::default();
+        }
+        let amounts = now.amounts(&scale, texel, water);
+        let look = now.look(&amounts, water);
+        let pores_before = scale.amounts(water).pores_mm;
+        self.ledger.evaporated += scale.commit(water, amounts, look, now.tick);
+        if let Some(marks) = self.marks.get_mut(texel as usize) {
+            let left = amounts.film_mm + amounts.pores_mm;
+            marks.grow(now.material, pores_before - left, water.reserve);
+        }
+        amounts
+    }
+
+    /// Brings all texels to the present, before something changes that their past depended on.
+    pub(crate) fn settle_all(&mut self, now: &Now) {
+        for texel in 0..self.texels.len() as u32 {
+            if !self.texels[texel as usize].is_dry() {
+                self.settle(now, texel);
+                let tile = self.tile_of(texel);
+                self.tiles.touch(tile);
+            }
+        }
+    }
+
+    /// Adds water to a texel, now. What does not fit is spilled.
+    pub(crate) fn add(&mut self, now: &Now, texel: u32, units: u64) {
+        self.settle(now, texel);
+        let tile = self.tile_of(texel);
+        let water = &mut self.texels[texel as usize];
+        let room = u64::from(u32::MAX - water.film);
+        let added = units.min(room);
+        water.film += added as u32;
+        self.ledger.spilled += units - added;
+        self.tiles.touch(tile);
+    }
+
+    /// Film and absorbed water of all texels now, and what has evaporated by now; units.
+    pub(crate) fn stock(&self, now: &Now) -> Stock {
+        let mut stock = Stock { evaporated: self.ledger.evaporated, ..default() };
+        for (texel, water) in self.texels.iter().enumerate().filter(|(_, water)| !water.is_dry()) {
+            let scale = now.scale(self.units, texel as u32);
+            let mut copy = *water;
+            let amounts = now.amounts(&scale, texel as u32, water);
+            if copy.tick < now.tick {
+                stock.evaporated += scale.commit(&mut copy, amounts, WaterLook::default(), now.tick);
+            }
+            stock.film += u64::from(copy.film);
+            stock.pores += u64::from(copy.pores);
+        }
+        stock
+    }
+}
+
+/// Where the water of a surface is at a moment; units.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Stock {
+    /// On it.
+    pub film: u64,
+    /// In it.
+    pub pores: u64,
+    /// Gone into the air.
+    pub evaporated: u64,
+}

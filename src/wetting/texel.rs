@@ -1,0 +1,148 @@
+//! What a texel holds, in whole numbers.
+//!
+//! Amounts are volumes in *units* of `2^-shift` nanolitres, one shift for all texels of a surface, chosen so that a unit is
+//! about a nanometre deep on a texel of mean size. So what goes from one texel to another is exact whatever their areas,
+//! and what came with particles, in whole nanolitres, is exact too.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::evolve::Amounts;
+use super::look::WaterLook;
+
+/// State of one texel: what it held at its reference tick. What it holds now is [`evolve`](super::evolve::evolve)'s to say.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
+pub struct TexelWater {
+    /// Film on the surface, units.
+    pub film: u32,
+    /// Absorbed, units.
+    pub pores: u32,
+    /// Reference tick; 0 if it never was wet.
+    pub tick: u32,
+    /// How wet it looked at the reference tick, 0..=255.
+    pub shown: u8,
+    /// Demand that goes by before its pores dry, in 1/255 of the material's
+    /// [`reserve_mm`](crate::material::PorousMaterial::reserve_mm).
+    pub reserve: u8,
+    /// Always 0.
+    pub pad: [u8; 2],
+}
+
+impl TexelWater {
+    /// All water, units.
+    pub fn total(&self) -> u64 {
+        u64::from(self.film) + u64::from(self.pores)
+    }
+
+    /// Whether it holds nothing.
+    pub fn is_dry(&self) -> bool {
+        self.film == 0 && self.pores == 0
+    }
+}
+
+/// Volumes of a surface: how many units there are to a nanolitre.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Units {
+    /// A unit is 2^-shift nanolitres.
+    pub shift: u32,
+}
+
+impl Units {
+    /// The finest unit.
+    pub const MAX_SHIFT: u32 = 12;
+
+    /// Such that a unit is about a nanometre on a texel of this area, mm², and never more than a nanolitre.
+    pub fn for_area(mean_mm2: f32) -> Self {
+        let per_nl = 1000.0 / mean_mm2.max(1e-3);
+        Self { shift: per_nl.log2().round().clamp(0.0, Self::MAX_SHIFT as f32) as u32 }
+    }
+
+    /// Units in so many nanolitres.
+    pub fn from_nl(self, nl: u64) -> u64 {
+        nl << self.shift
+    }
+
+    /// Whole nanolitres in so many units.
+    pub fn whole_nl(self, units: u64) -> u64 {
+        units >> self.shift
+    }
+
+    /// Cubic millimetres: 1 nl is 0.001 mm³.
+    pub fn mm3(self, units: u64) -> f64 {
+        units as f64 * self.mm_on(1.0)
+    }
+
+    /// Depth of a unit on a texel of this area, mm² above 0, in mm.
+    pub fn mm_on(self, area_mm2: f32) -> f64 {
+        1.0e-3 / (f64::from(1u32 << self.shift) * f64::from(area_mm2))
+    }
+}
+
+/// What a texel is worth in mm, and its constants.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    /// Depth of a unit, mm.
+    pub unit_mm: f64,
+    /// What 255 of [`TexelWater::reserve`] stand for, mm.
+    pub reserve_mm: f64,
+}
+
+impl Scale {
+    /// As depths.
+    pub fn amounts(&self, texel: &TexelWater) -> Amounts {
+        Amounts {
+            film_mm: f64::from(texel.film) * self.unit_mm,
+            pores_mm: f64::from(texel.pores) * self.unit_mm,
+            reserve_mm: f64::from(texel.reserve) / 255.0 * self.reserve_mm,
+        }
+    }
+
+    /// Makes `amounts` the texel's own at `tick`; returns the units that evaporated on the way. What is rounded off stays
+    /// in the film or, if there is none, counts as evaporated: nothing is lost.
+    pub fn commit(&self, texel: &mut TexelWater, amounts: Amounts, look: WaterLook, tick: u32) -> u64 {
+        let before = texel.total();
+        let units = |mm: f64| (mm / self.unit_mm).round().clamp(0.0, f64::from(u32::MAX)) as u64;
+        let pores = units(amounts.pores_mm).min(before);
+        let gone = before as f64 * self.unit_mm - amounts.film_mm - amounts.pores_mm;
+        let film = if amounts.film_mm > 0.0 { (before - pores).saturating_sub(units(gone)) } else { 0 };
+        texel.film = u32::try_from(film).unwrap_or(u32::MAX);
+        texel.pores = u32::try_from(pores).unwrap_or(u32::MAX);
+        texel.tick = tick;
+        texel.shown = (look.wetness * 255.0).round().clamp(0.0, 255.0) as u8;
+        let reserve = if self.reserve_mm > 0.0 { amounts.reserve_mm / self.reserve_mm } else { 0.0 };
+        texel.reserve = (reserve * 255.0).ceil().clamp(0.0, 255.0) as u8;
+        before - texel.total()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_unit_is_about_a_nanometre_deep_on_the_mean_texel() {
+        for area in [0.05, 0.25, 1.0, 25.0, 333.0] {
+            let units = Units::for_area(area);
+            let depth = units.mm_on(area);
+            assert!((0.7e-6..1.5e-6).contains(&depth) || units.shift == Units::MAX_SHIFT, "{area}: {depth}");
+        }
+        assert_eq!(Units::for_area(1e6).shift, 0);
+        let units = Units { shift: 5 };
+        assert_eq!(units.whole_nl(units.from_nl(77) + 31), 77);
+        assert!((units.mm3(units.from_nl(2_500_000)) - 2500.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_is_committed_adds_up() {
+        let scale = Scale { unit_mm: 1.0e-6, reserve_mm: 0.05 };
+        let look = WaterLook { wetness: 0.5, gloss: 0.2 };
+        let start = TexelWater { film: 1000, pores: 5000, tick: 1, ..Default::default() };
+        let mut texel = start;
+        let amounts = Amounts { film_mm: 0.0006, pores_mm: 0.0053, reserve_mm: 0.01 };
+        let gone = scale.commit(&mut texel, amounts, look, 9);
+        assert_eq!((texel.film, texel.pores, texel.tick, gone), (600, 5300, 9, 100));
+        assert_eq!((texel.shown, texel.reserve), (128, 51));
+        let gone = scale.commit(&mut texel, Amounts::default(), look, 10);
+        assert_eq!((texel.total(), gone), (0, 5900));
+    }
+}

@@ -1,0 +1,124 @@
+//! One tick of all water, surface by surface.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use bevy::prelude::*;
+use bevy::utils::Parallel;
+
+use super::rim::{RimScratch, measure_rims};
+use super::run_off::{RunScratch, run_off};
+use super::soak::{SoakScratch, soak};
+use super::spread::{SpreadScratch, spread};
+use super::{Dripping, DropQueue, Exposure, Now, SurfaceWater, WetGeometry};
+use crate::clock::WeatheringClock;
+use crate::material::PorousMaterial;
+use crate::weather::DryingClock;
+
+/// What the water has cost so far. Surfaces at rest add nothing.
+#[derive(Resource, Debug, Default)]
+pub struct WettingStats {
+    drops: AtomicU64,
+    tiles_run: AtomicU64,
+    tiles_spread: AtomicU64,
+    rims: AtomicU64,
+}
+
+impl WettingStats {
+    /// Drops soaked up.
+    pub fn drops(&self) -> u64 {
+        self.drops.load(Ordering::Relaxed)
+    }
+
+    /// Steps of tiles with films that run.
+    pub fn tiles_run(&self) -> u64 {
+        self.tiles_run.load(Ordering::Relaxed)
+    }
+
+    /// Steps of tiles whose pores share water.
+    pub fn tiles_spread(&self) -> u64 {
+        self.tiles_spread.load(Ordering::Relaxed)
+    }
+
+    /// Surfaces whose rims were measured.
+    pub fn rims(&self) -> u64 {
+        self.rims.load(Ordering::Relaxed)
+    }
+}
+
+/// Buffers of one thread.
+#[derive(Default)]
+pub(super) struct Scratch {
+    soak: SoakScratch,
+    run: RunScratch,
+    spread: SpreadScratch,
+    rim: RimScratch,
+}
+
+type Surface = (
+    &'static mut SurfaceWater,
+    &'static mut DropQueue,
+    &'static mut Dripping,
+    &'static WetGeometry,
+    Option<&'static Exposure>,
+    Option<&'static PorousMaterial>,
+);
+
+/// Soaks up what came, runs, spreads, and measures rims, on all surfaces that have something to do. Surfaces do not share
+/// texels, so they take their turns in parallel.
+pub(super) fn advance_water(
+    clock: Res<WeatheringClock>,
+    drying: Res<DryingClock>,
+    stats: Res<WettingStats>,
+    scratch: Local<Parallel<Scratch>>,
+    mut surfaces: Query<Surface>,
+) {
+    let busy = |water: &SurfaceWater, drops: &DropQueue| {
+        !drops.0.is_empty() || !water.is_at_rest() || water.rained_at != 0
+    };
+    let count = surfaces.iter().filter(|(water, drops, ..)| busy(water, drops)).count();
+    if count == 0 {
+        return;
+    }
+    let default = PorousMaterial::default();
+    let advance =
+        |scratch: &mut Scratch,
+         (mut water, mut drops, mut drips, geometry, exposure, material): SurfaceItem| {
+            // Change detection is for those who draw it, and looks at its dirty tiles.
+            let (water, drops) = (&mut *water, drops.bypass_change_detection());
+            let material = material.unwrap_or(&default);
+            let now = Now::new(clock.tick(), clock.hz(), &drying, &geometry.0, exposure, material);
+            if !drops.0.is_empty() {
+                water.wake(material.efflorescence > 0.0 || material.tide_mark > 0.0);
+            }
+            for drop in &drops.0 {
+                soak(water, &now, drop, &mut scratch.soak);
+            }
+            stats.drops.fetch_add(drops.0.len() as u64, Ordering::Relaxed);
+            drops.0.clear();
+            let drips = &mut drips.bypass_change_detection().0;
+            let tiles = run_off(water, &now, &mut scratch.run, drips);
+            stats.tiles_run.fetch_add(u64::from(tiles), Ordering::Relaxed);
+            let tiles = spread(water, &now, &mut scratch.spread);
+            stats.tiles_spread.fetch_add(u64::from(tiles), Ordering::Relaxed);
+            let measured = measure_rims(water, &now, &mut scratch.rim);
+            stats.rims.fetch_add(u64::from(measured), Ordering::Relaxed);
+        };
+    let busy_ones = |item: &SurfaceItem| busy(&item.0, &item.1);
+    if count == 1 {
+        let mut scratch = scratch.borrow_local_mut();
+        surfaces.iter_mut().filter(busy_ones).for_each(|item| advance(&mut scratch, item));
+    } else {
+        let scratch = &*scratch;
+        let one_each = bevy::ecs::batching::BatchingStrategy::fixed(1);
+        surfaces.par_iter_mut().batching_strategy(one_each).for_each_init(
+            || scratch.borrow_local_mut(),
+            |scratch, item| {
+                if busy_ones(&item) {
+                    advance(scratch, item);
+                }
+            },
+        );
+    }
+}
+
+type SurfaceItem<'w, 's> = bevy::ecs::query::QueryItem<'w, 's, Surface>;
