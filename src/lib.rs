@@ -14,7 +14,7 @@ pub mod scenario;
 pub mod scenes;
 pub mod schedule;
 pub mod weather;
-//TMP pub mod wetmap;
+pub mod wetmap;
 pub mod wetting;
 
 use bevy::app::PluginGroupBuilder;

@@ -132,14 +132,20 @@ fn a_ring_is_the_same_row_for_the_painter_and_for_the_material() {
     assert_eq!(wgsl_layout(WET_MAP, "RainRing"), rust);
 }
 
-/// The Rust side writes `[tick, hz]`.
+/// The Rust side writes four words, then the points.
 #[test]
-fn the_clock_is_two_words() {
-    let Layout { fields, size } = wgsl_layout(WET_MAP, "Clock");
-    let words: Vec<_> = fields.iter().map(|field| (field.name.as_str(), field.offset, field.size)).collect();
-    assert_eq!(words, [("tick", 0, 4), ("hz", 4, 4)]);
-    assert!(fields.iter().all(|field| field.kind == ScalarKind::Uint));
-    assert_eq!(size, 8);
+fn the_clock_is_four_words_and_its_points() {
+    let module = parse(WET_MAP);
+    let (_, clock) =
+        module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some("Clock")).expect("the shader has it");
+    let TypeInner::Struct { members, .. } = &clock.inner else { unreachable!("cut out as a struct") };
+    let fields: Vec<_> =
+        members.iter().map(|member| (member.name.as_deref().unwrap(), member.offset)).collect();
+    assert_eq!(fields, [("tick", 0), ("hz", 4), ("count", 8), ("pad", 12), ("points", 16)]);
+    let TypeInner::Array { stride, .. } = module.types[members[4].ty].inner else {
+        unreachable!("points are an array")
+    };
+    assert_eq!(stride as usize, size_of::<GpuDryingPoint>());
 }
 
 /// `PorousUniform` has no layout of its own: encase writes it. So its bytes are looked at.

@@ -38,5 +38,7 @@ mod replay;
 mod schedule;
 /// The smaller tools of the program.
 mod tools;
+/// Wet maps, made as their users make them.
+mod wetmap;
 /// The sandbox in a real window, with real keys.
 mod window;

@@ -312,7 +312,10 @@ fn the_maps_hold_the_water_in_micrometres() {
         let actual = sum * texel_mm2 / 1000.0;
         assert!(expected > 0.0, "{map}");
         // Each value is rounded.
-        assert!((actual / expected - 1.0).abs() < 0.02, "{actual} mm³ in the map, {expected} mm³ in the report");
+        assert!(
+            (actual / expected - 1.0).abs() < 0.02,
+            "{actual} mm³ in the map, {expected} mm³ in the report"
+        );
     }
 }
 

@@ -26,7 +26,7 @@ fn coverage(map: &GreyMap) -> f32 {
     map.values.iter().filter(|&&value| value > 0.0).count() as f32 / map.values.len() as f32
 }
 
-/// A tiled floor of 96 by 64 pixels, and the same with a wet disc of radius 20 around its middle, darker by half.
+/// A tiled floor of 96 by 64 pixels, and the same with a disc of radius 20 in its middle darker by half.
 fn photos(folder: &Path) {
     let picture = |wet: bool| {
         RgbImage::from_fn(96, 64, |x, y| {
@@ -68,7 +68,8 @@ fn noise_covers_what_it_should_and_repeats() {
     let some = map(folder.path(), "perlin --size 96 --coverage 0.4 --seed 5 --cycles 4 --octaves 3", "a.png");
     assert_eq!((some.width, some.height), (96, 96));
     assert!((coverage(&some) - 0.4).abs() < 1e-3);
-    let again = map(folder.path(), "perlin --size 96 --coverage 0.4 --seed 5 --cycles 4 --octaves 3", "b.png");
+    let again =
+        map(folder.path(), "perlin --size 96 --coverage 0.4 --seed 5 --cycles 4 --octaves 3", "b.png");
     assert_eq!(some, again);
     assert_eq!(map(folder.path(), "perlin", "c.exr").width, 512);
 }
@@ -83,7 +84,7 @@ fn drops_fall_on_what_is_wet_already() {
     assert_eq!(map(folder.path(), options, "both.exr"), below.add(&drops).unwrap());
 }
 
-/// A ground of 4 m by 4 m with its uv square along x and z, and 1 m above it a roof over all of its negative x.
+/// A ground of 4 m by 4 m with its uv square along x and z, and a roof 1 m above its half at negative x.
 fn shelter(folder: &Path) {
     let quad = |low: [f32; 2], high: [f32; 2], y: f32| {
         let [p, q, r, s] =
@@ -129,7 +130,8 @@ fn shelter(folder: &Path) {
     std::fs::write(folder.join("shelter.gltf"), json.to_string()).unwrap();
 }
 
-/// Parallel rain on a ground from -2 to 2 along u: the border of the shelter, and what lies beyond, in every row.
+/// Parallel rain on a ground from -2 to 2 along u: the border of the shelter, and what lies beyond, in every
+/// row.
 fn assert_border(map: &GreyMap, border: f32, open: f32) {
     for y in 0..map.height {
         for x in 0..map.width {

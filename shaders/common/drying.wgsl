@@ -64,8 +64,8 @@ fn sigmoid(u: f32) -> f32 {
 
 // How dry it looks when the part `u` of its water is gone.
 fn drying_sigmoid(u: f32) -> f32 {
-    let from = sigmoid(0.0);
-    return saturate((sigmoid(saturate(u)) - from) / (sigmoid(1.0) - from));
+    let least = sigmoid(0.0);
+    return saturate((sigmoid(saturate(u)) - least) / (sigmoid(1.0) - least));
 }
 
 // How much of its gloss is left when the part `u` of its water is gone.

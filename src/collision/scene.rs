@@ -75,6 +75,11 @@ impl CollisionScene {
         self.instances.is_empty()
     }
 
+    /// Smallest and largest corner of everything that can be hit; infinite, the wrong way round, if there is nothing.
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        self.bounds
+    }
+
     /// The closest hit on the segment from `start` to `end`, seen from either side.
     #[inline]
     pub fn cast(&self, start: Vec3, end: Vec3) -> Option<SceneHit> {

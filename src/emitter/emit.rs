@@ -7,7 +7,8 @@ use super::{EmissionSeed, Emitter};
 use crate::clock::WeatheringClock;
 use crate::effect::EffectTable;
 use crate::particle::{
-    Lifespan, ParticleBundle, ParticleConfig, ParticleCounts, Position, Sequence, Velocity, Volume, WaterCounts,
+    Lifespan, ParticleBundle, ParticleConfig, ParticleCounts, Position, Sequence, Velocity, Volume,
+    WaterCounts,
 };
 
 /// What an [`Emitter`] has sent out and still owes.

@@ -7,7 +7,8 @@ use bevy::prelude::*;
 use super::uniform::SurfaceLook;
 use super::warm_up::{ShaderChanges, Understudy, rehearse};
 use super::{
-    ClockBuffer, PlayedWetMap, PorousExtension, PorousMaterial, StandingWater, WeatheredMaterial, WettingTextures,
+    ClockBuffer, PlayedWetMap, PorousExtension, PorousMaterial, StandingWater, WeatheredMaterial,
+    WettingTextures,
 };
 use crate::clock::WeatheringClock;
 use crate::overlay::{Overlays, SurfaceTraces, TexelAreas, Weatherable};

@@ -4,8 +4,8 @@ use bevy::prelude::*;
 
 use super::models::lekner_dorf::{LiquidFilm, N_WATER};
 use super::{
-    BaseBrdf, Coated, Flood, PlayedWetMap, Playing, PorositySource, PorousKey, PorousMaterial, PorousUniform, StandingWater,
-    TextureMeaning, WettingModel, WettingTextures,
+    BaseBrdf, Coated, Flood, PlayedWetMap, Playing, PorositySource, PorousKey, PorousMaterial, PorousUniform,
+    StandingWater, TextureMeaning, WettingModel, WettingTextures,
 };
 use crate::overlay::{Overlays, SurfaceTraces, TexelAreas, Wrap};
 

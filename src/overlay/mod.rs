@@ -25,9 +25,9 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub use cpu::{CpuMaps, CpuOverlayPlugin};
+pub(crate) use deposit::measure_texels;
 pub use deposit::{DepositPlugin, SplatQueue, SurfaceTotals, SurfaceTraces, deposit_splats};
 pub use gpu::{GpuOverlayPlugin, Overlays, SplatStats, SurfaceBatch};
-pub(crate) use deposit::measure_texels;
 pub(crate) use maps::Footprint;
 pub use maps::{RainRing, TexelAreas};
 pub use splat::Splat;

@@ -21,8 +21,8 @@ mod retire;
 use bevy::prelude::*;
 
 use crate::effect::EffectIndex;
-use crate::weather::Weather;
 use crate::schedule::{RetireParticles, WeatheringSystems, WeatheringTick};
+use crate::weather::Weather;
 
 pub use draw::{ParticleDrawPlugin, ParticleMesh};
 pub use integrate::integrate_particles;

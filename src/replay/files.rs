@@ -65,13 +65,8 @@ mod tests {
     #[test]
     fn an_earlier_run_is_removed_and_nothing_else() {
         let folder = tempfile::tempdir().unwrap();
-        let ours = [
-            "report.json",
-            "frame_00000.png",
-            "frame_123456.png",
-            "maps/a_b_film.png",
-            "maps/a_since.png",
-        ];
+        let ours =
+            ["report.json", "frame_00000.png", "frame_123456.png", "maps/a_b_film.png", "maps/a_since.png"];
         let others = ["frame_1.png", "frame_abcde.png", "notes.txt", "maps/mine.png"];
         for name in ours.iter().chain(&others) {
             write_atomic(&folder.path().join(name), b"x").unwrap();

@@ -2,19 +2,27 @@
 
 use bevy::asset::RenderAssetUsages;
 use bevy::image::{CompressedImageFormats, ImageSampler, ImageType};
-use bevy::math::Affine2;
+use bevy::math::{Affine2, Affine3A};
 use bevy::prelude::*;
 use bevy::render::render_resource::Face;
 
-use super::{LoadedScenario, MaterialSpec, MeshSpec, ScenarioError, SurfaceTextureSpec, TextureSpec};
+use super::{
+    LoadedScenario, MaterialSpec, MeshSpec, ScenarioError, SurfaceSpec, SurfaceTextureSpec, TextureSpec,
+};
+use crate::collision::MeshTriangles;
 use crate::effect::WeatherEffect;
 use crate::material::WettingTextures;
+use crate::overlay::Weatherable;
 use crate::scenes::environment::{
     EnvironmentMaps, EnvironmentSettings, environment_maps_from_equirect, load_equirect,
 };
+use crate::scenes::gltf_mesh::read_first_primitive;
 use crate::scenes::meshes::{self, MeshError};
 use crate::scenes::mips::{MipContent, tiling_sampler, with_mips};
 use crate::scenes::stone::stone_maps;
+
+/// Name, triangles, where it stands, and its maps.
+pub type SurfaceMesh = (String, MeshTriangles, Affine3A, Weatherable);
 
 /// Everything but meshes from files, which Bevy's asset server loads.
 pub(super) struct Content {
@@ -100,6 +108,30 @@ impl LoadedScenario {
             }
         }
         Ok(Content { effects, meshes, materials, wet_maps, environment })
+    }
+
+    /// The shape of every surface, for tools that need no app: name, triangles, where it stands, and its maps.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Content`] for meshes that cannot be used.
+    pub fn surface_meshes(&self) -> Result<Vec<SurfaceMesh>, ScenarioError> {
+        let one = |(index, surface): (usize, &SurfaceSpec)| {
+            let field = format!("surfaces[{index}].mesh");
+            let triangles = match (&surface.mesh, generate(&surface.mesh)) {
+                (MeshSpec::File(file), _) => {
+                    let path = self.resolve(&field, file)?;
+                    read_first_primitive(&path).map_err(|e| self.content_error(&field, file, e))?
+                }
+                (_, Some(mesh)) => {
+                    let mesh = mesh.map_err(|e| self.content_error(&field, &surface.name, e))?;
+                    MeshTriangles::from_mesh(&mesh)
+                        .map_err(|e| self.content_error(&field, &surface.name, e))?
+                }
+                (_, None) => return Err(self.content_error(&field, &surface.name, "has no shape")),
+            };
+            Ok((surface.name.clone(), triangles, surface.transform().compute_affine(), surface.maps))
+        };
+        self.scenario.surfaces.iter().enumerate().map(one).collect()
     }
 
     fn material_maps(&self, field: &str, material: &MaterialSpec) -> Result<MaterialMaps, ScenarioError> {

@@ -19,6 +19,7 @@ mod schema;
 mod spawn;
 mod validate;
 
+pub use content::SurfaceMesh;
 pub use digest::{Digest, amounts_digest};
 pub use error::ScenarioError;
 pub use load::LoadedScenario;

@@ -6,9 +6,9 @@ use super::Digest;
 use crate::clock::WeatheringClock;
 use crate::emitter::{Emitter, EmitterState, NewParticles};
 use crate::overlay::{CpuMaps, SplatQueue, SurfaceTotals, Weatherable};
+use crate::particle::{Lifespan, ParticleCounts, WaterCounts};
 use crate::weather::DryingClock;
 use crate::wetting::{DropQueue, SurfaceWater};
-use crate::particle::{Lifespan, ParticleCounts, WaterCounts};
 
 /// Takes a scenario back to tick 0: dry surfaces, no particles, the same random streams. What follows is what
 /// followed the first time.

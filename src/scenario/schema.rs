@@ -322,6 +322,18 @@ fn default_map_fill() -> f32 {
     0.2
 }
 
+impl SurfaceSpec {
+    /// Where it stands.
+    pub fn transform(&self) -> Transform {
+        let turn = self.rotation_deg.map(f32::to_radians);
+        Transform {
+            translation: self.position,
+            rotation: Quat::from_euler(EulerRot::YXZ, turn.y, turn.x, turn.z),
+            scale: self.scale,
+        }
+    }
+}
+
 fn default_scale() -> Vec3 {
     Vec3::ONE
 }

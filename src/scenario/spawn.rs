@@ -77,7 +77,10 @@ impl Plugin for ScenarioPlugin {
             .insert_resource(CurrentScenario(self.scenario.clone()))
             .init_resource::<ScenarioStatus>()
             .init_resource::<Digest>()
-            .add_systems(PreUpdate, watch_loading.run_if(is_loading).after(BuildColliders).after(MeasureSurfaces))
+            .add_systems(
+                PreUpdate,
+                watch_loading.run_if(is_loading).after(BuildColliders).after(MeasureSurfaces),
+            )
             .add_systems(
                 WeatheringTick,
                 (
@@ -139,12 +142,7 @@ fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, loo
             (_, Some(mesh)) => world.resource_mut::<Assets<Mesh>>().add(mesh),
             (_, None) => continue,
         };
-        let turn = spec.rotation_deg.map(f32::to_radians);
-        let transform = Transform {
-            translation: spec.position,
-            rotation: Quat::from_euler(EulerRot::YXZ, turn.y, turn.x, turn.z),
-            scale: spec.scale,
-        };
+        let transform = spec.transform();
         let surface = ScenarioSurface { index: index as u32, name: spec.name.clone() };
         let mut entity = world.spawn((
             Name::new(spec.name.clone()),
@@ -234,7 +232,10 @@ fn watch_loading(
     surfaces: Query<(&ScenarioSurface, &Mesh3d, Option<&NotWeatherable>)>,
     unfinished: Query<
         (),
-        (With<ScenarioSurface>, Or<(Without<SurfaceCollider>, Without<TexelAreas>, Without<wetting::Exposure>)>),
+        (
+            With<ScenarioSurface>,
+            Or<(Without<SurfaceCollider>, Without<TexelAreas>, Without<wetting::Exposure>)>,
+        ),
     >,
     exposure: Res<ExposureProgress>,
     mut status: ResMut<ScenarioStatus>,

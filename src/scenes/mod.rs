@@ -9,9 +9,11 @@
 //! | [`meshes`] | ground, road, cloth, sphere, rock, vase and flowerpot, with a UV layout to wet |
 //! | [`environment`] | a skybox and image-based light from an equirectangular photograph |
 //! | [`stone`] | tileable terracotta, sandstone, concrete and brickwork |
+//! | [`gltf_mesh`] | the meshes of a glTF file, for tools without an asset server |
 //! | [`mips`] | mip maps, which Bevy does not make, for these and for loaded photographs |
 
 pub mod environment;
+pub mod gltf_mesh;
 pub mod meshes;
 pub mod mips;
 pub mod stone;

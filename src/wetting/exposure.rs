@@ -20,9 +20,7 @@ use crate::collision::{CollisionScene, MeshBvh, MeshColliders, SurfaceCollider};
 use crate::material::PorousMaterial;
 use crate::overlay::Wrap;
 use crate::weather::{DryingClock, Weather};
-//TMPfn
-fn accessibility(_: &CollisionScene, p: &[super::SurfacePoint], _: u32, _: f32) -> Vec<f32> { vec![1.0; p.len()] }
-fn sun_visibility(_: &CollisionScene, p: &[super::SurfacePoint], _: Vec3) -> Vec<f32> { vec![1.0; p.len()] }
+use crate::wetmap::{accessibility, sun_visibility};
 
 /// What of the weather's demand gets at each texel of a surface.
 #[derive(Component, Debug, Clone, PartialEq)]

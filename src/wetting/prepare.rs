@@ -26,6 +26,13 @@ pub(super) struct Measured {
 }
 
 impl Measured {
+    /// The geometry, once, when it is there.
+    fn finished(&mut self) -> Option<TexelGeometry> {
+        let geometry = check_ready(self.task.as_mut()?)?;
+        self.task = None;
+        Some(geometry)
+    }
+
     fn is_of(&self, surface: &Weatherable, collider: &SurfaceCollider, transform: &GlobalTransform) -> bool {
         let matrix = transform.affine().matrix3;
         let scale = self.matrix.determinant().abs().cbrt().max(1e-12);
@@ -39,54 +46,47 @@ impl Measured {
 
 type Measurable = (
     Entity,
-    &'static Weatherable,
-    &'static SurfaceCollider,
+    Ref<'static, Weatherable>,
+    Ref<'static, SurfaceCollider>,
     &'static TexelAreas,
-    &'static GlobalTransform,
+    Ref<'static, GlobalTransform>,
     Option<&'static mut Measured>,
     Option<&'static mut SurfaceWater>,
 );
 
 /// Measures new surfaces, and those that change their shape, map size or how they stand.
-pub(super) fn measure_surfaces(
-    mut commands: Commands,
-    mut surfaces: Query<
-        Measurable,
-        Or<(Without<WetGeometry>, Changed<GlobalTransform>, Changed<Weatherable>, Changed<SurfaceCollider>)>,
-    >,
-    mut measuring: Query<(Entity, &mut Measured, &Weatherable, &TexelAreas, Option<&mut SurfaceWater>)>,
-) {
-    for (entity, surface, collider, areas, transform, measured, water) in &mut surfaces {
-        if measured.is_some_and(|measured| measured.is_of(surface, collider, transform)) {
+pub(super) fn measure_surfaces(mut commands: Commands, mut surfaces: Query<Measurable>) {
+    for (entity, surface, collider, areas, transform, mut measured, mut water) in &mut surfaces {
+        let changed = surface.is_changed() || collider.is_changed() || transform.is_changed();
+        let stale = match &measured {
+            None => true,
+            Some(measured) => changed && !measured.is_of(&surface, &collider, &transform),
+        };
+        let (size, wrap) = (surface.texels(), surface.wrap());
+        if stale {
+            if let Some(water) = &mut water
+                && (water.size, water.wrap) != (size, wrap)
+            {
+                // What was on the old maps is gone with them.
+                let generation = water.generation + 1;
+                **water = SurfaceWater::new(&surface, areas.mean_mm2);
+                water.generation = generation;
+                commands.entity(entity).remove::<(WetGeometry, Exposure)>();
+            }
+            let (affine, bvh) = (transform.affine(), collider.0.clone());
+            let triangles = bvh.clone();
+            let task = AsyncComputeTaskPool::get().spawn(async move {
+                TexelGeometry::new(triangles.triangles(), &affine, Vec3::Y, size, wrap)
+            });
+            let matrix = affine.matrix3;
+            commands.entity(entity).insert(Measured { size, wrap, bvh, matrix, task: Some(task) });
             continue;
         }
-        let (size, wrap) = (surface.texels(), surface.wrap());
-        if let Some(mut water) = water
-            && (water.size, water.wrap) != (size, wrap)
-        {
-            // What was on the old maps is gone with them.
-            let generation = water.generation + 1;
-            *water = SurfaceWater::new(surface, areas.mean_mm2);
-            water.generation = generation;
-            commands.entity(entity).remove::<(WetGeometry, Exposure)>();
-        }
-        let affine = transform.affine();
-        let bvh = collider.0.clone();
-        let triangles = bvh.clone();
-        let task = AsyncComputeTaskPool::get().spawn(async move {
-            TexelGeometry::new(triangles.triangles(), &affine, Vec3::Y, size, wrap)
-        });
-        let matrix = affine.matrix3;
-        commands.entity(entity).insert(Measured { size, wrap, bvh, matrix, task: Some(task) });
-    }
-    for (entity, mut measured, surface, areas, water) in &mut measuring {
-        let Some(task) = &mut measured.task else { continue };
-        let Some(geometry) = check_ready(task) else { continue };
-        measured.task = None;
+        let Some(geometry) = measured.as_mut().and_then(|measured| measured.finished()) else { continue };
         let mut entity = commands.entity(entity);
         entity.insert(WetGeometry(Arc::new(geometry))).remove::<Exposure>();
         if water.is_none() {
-            entity.insert(SurfaceWater::new(surface, areas.mean_mm2));
+            entity.insert(SurfaceWater::new(&surface, areas.mean_mm2));
         }
     }
 }

@@ -5,7 +5,9 @@ use bevy::time::TimeUpdateStrategy;
 use bevy_weathering::material::{DryMaterial, PorousMaterial, Understudy, WeatheredMaterial, WettingModel};
 use bevy_weathering::overlay::{Overlays, Weatherable};
 
-use super::app::{add_target, app_that_compiles_in_the_background, camera, cover, picture, still, update, update_until};
+use super::app::{
+    add_target, app_that_compiles_in_the_background, camera, cover, picture, still, update, update_until,
+};
 use super::images::keep;
 
 const SIZE: UVec2 = UVec2::new(64, 64);

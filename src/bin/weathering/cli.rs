@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::wetmap::WetMapCommand;
 use bevy::math::UVec2;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
@@ -19,6 +20,9 @@ pub enum Command {
     Replay(ReplayArgs),
     /// Open a scenario in a window
     Sandbox(SandboxArgs),
+    /// Make a wet map: what of a surface gets wet first
+    #[command(subcommand)]
+    Wetmap(WetMapCommand),
     /// Make a wet version of a base colour texture
     WetTexture(WetTextureArgs),
 }

@@ -4,6 +4,7 @@ mod cli;
 mod replay;
 mod sandbox;
 mod wet_texture;
+mod wetmap;
 
 use std::process::ExitCode;
 
@@ -13,6 +14,7 @@ fn main() -> ExitCode {
     let result = match cli::Cli::parse().command {
         cli::Command::Replay(arguments) => replay::run(&arguments),
         cli::Command::Sandbox(arguments) => sandbox::run(&arguments),
+        cli::Command::Wetmap(command) => wetmap::run(&command),
         cli::Command::WetTexture(arguments) => wet_texture::run(&arguments),
     };
     match result {

@@ -187,12 +187,9 @@ pub(super) fn prepare_splats(
     list.clear();
     for waiting in pending.surfaces.iter_mut().filter(|surface| !surface.splats.is_empty()) {
         let Maps { size, wrap, images: [diffuse, specular, normal], rings } = waiting.maps;
-        let (Some(diffuse), Some(specular), Some(normal), Some(rings)) = (
-            images.get(diffuse),
-            images.get(specular),
-            images.get(normal),
-            buffers.get(rings),
-        ) else {
+        let (Some(diffuse), Some(specular), Some(normal), Some(rings)) =
+            (images.get(diffuse), images.get(specular), images.get(normal), buffers.get(rings))
+        else {
             continue;
         };
         let first_tile = tiles.len() as u32;
