@@ -40,5 +40,7 @@ mod schedule;
 mod tools;
 /// Wet maps, made as their users make them.
 mod wetmap;
+/// Water in and on surfaces.
+mod wetting;
 /// The sandbox in a real window, with real keys.
 mod window;

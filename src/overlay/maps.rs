@@ -40,7 +40,7 @@ impl TexelAreas {
     /// Rasterizes the triangles over their uvs; a texel belongs to the triangle that its middle lies in, once per
     /// tile of tiled uvs, and takes its density. Uvs outside the map go where [`Wrap`] says. A triangle that covers no
     /// middle gives its area to the texel it lies in; one that reaches over a whole map, to all texels alike. So
-    /// `total_mm2` is the area of the mesh, but for overlaps along the edges of islands.
+    /// `total_mm2` is the area of the mesh.
     pub fn new(triangles: &MeshTriangles, world_from_mesh: &Affine3A, size: u32, wrap: [Wrap; 2]) -> Self {
         let side = size as i32;
         let mut mm2 = vec![0.0f32; (size * size) as usize];
@@ -51,10 +51,11 @@ impl TexelAreas {
             };
             mm2[(inside(y, wrap[1]) * side + inside(x, wrap[0])) as usize] += area;
         };
-        let mut everywhere = 0.0;
+        let (mut everywhere, mut mesh_mm2) = (0.0, 0.0);
         for (corners, uvs) in triangles.positions.iter().zip(&triangles.uvs) {
             let [a, b, c] = corners.map(|corner| world_from_mesh.transform_point3(corner));
             let area_mm2 = (b - a).cross(c - a).length() * 0.5e6;
+            mesh_mm2 += f64::from(area_mm2);
             let texels = Footprint::new(uvs.map(|uv| uv * size as f32));
             let (low, high) = texels.bounds();
             if (high - low).max_element() > size as f32 + 1.0 {
@@ -81,6 +82,12 @@ impl TexelAreas {
         if everywhere > 0.0 {
             let share = (everywhere / f64::from(size * size)) as f32;
             mm2.iter_mut().for_each(|texel| *texel += share);
+        }
+        // Middles are counted, not parts of texels: what islands gain or lose at their borders by that is made up for.
+        let counted: f64 = mm2.iter().copied().map(f64::from).sum();
+        if counted > 0.0 && mesh_mm2.is_finite() {
+            let scale = (mesh_mm2 / counted) as f32;
+            mm2.iter_mut().for_each(|texel| *texel *= scale);
         }
         let total_mm2 = mm2.iter().copied().map(f64::from).sum();
         let used = mm2.iter().filter(|&&area| area > 0.0).count().max(1);

@@ -36,14 +36,22 @@ pub struct WaterLook {
     pub wetness: f64,
     /// How much of its pores mirrors, 0..=1.
     pub gloss: f64,
+    /// How much of its film is to be seen, 0..=1.
+    pub film: f64,
 }
 
-/// How absorbed water looks. `visible_mm`: what looks fully wet, above 0; `shown`: how wet it looked at its reference
-/// time, 0..=1; `seconds` since then; `t_fill`: seconds that it takes to be seen.
-pub fn water_look(pores_mm: f64, visible_mm: f64, shown: f64, seconds: f64, t_fill: f64) -> WaterLook {
+/// How absorbed water looks, and how much of a film. `visible_mm`: what looks fully wet, above 0; `shown`: how wet it looked
+/// at its reference time and how much of its film was to be seen, 0..=1; `seconds` since then; `t_fill`: seconds that
+/// it takes to be seen.
+pub fn water_look(pores_mm: f64, visible_mm: f64, shown: [f64; 2], seconds: f64, t_fill: f64) -> WaterLook {
     let gone = 1.0 - (pores_mm / visible_mm).min(1.0);
-    let ramp = if seconds >= 0.0 { shown + seconds / t_fill.max(1e-6) } else { 0.0 };
-    WaterLook { wetness: (1.0 - drying_sigmoid(gone)).min(ramp), gloss: gloss_left(gone).min(ramp) }
+    let [ramp, film] =
+        shown.map(|shown| if seconds >= 0.0 { shown + seconds / t_fill.max(1e-6) } else { 0.0 });
+    WaterLook {
+        wetness: (1.0 - drying_sigmoid(gone)).min(ramp),
+        gloss: gloss_left(gone).min(ramp),
+        film: film.min(1.0),
+    }
 }
 
 #[cfg(test)]
@@ -64,10 +72,11 @@ mod tests {
 
     #[test]
     fn it_takes_its_time_to_be_seen_and_goes_on_from_where_it_was() {
-        let look = |shown, seconds| water_look(1.0, 0.1, shown, seconds, 2.0).wetness;
+        let look = |shown, seconds| water_look(1.0, 0.1, [shown, 0.0], seconds, 2.0).wetness;
         assert_eq!([look(0.0, 0.0), look(0.0, 0.5), look(0.0, 2.0)], [0.0, 0.25, 1.0]);
         assert_eq!([look(0.4, 0.0), look(0.4, -1.0)], [0.4, 0.0]);
-        assert_eq!(water_look(1.0, 0.1, 0.0, 0.0, 0.0).wetness, 0.0);
-        assert_eq!(water_look(1.0, 0.1, 0.0, 0.1, 0.0).wetness, 1.0);
+        assert_eq!(water_look(1.0, 0.1, [0.0; 2], 0.0, 0.0).wetness, 0.0);
+        assert_eq!(water_look(1.0, 0.1, [0.0; 2], 0.1, 0.0).wetness, 1.0);
+        assert_eq!(water_look(0.0, 0.1, [0.0, 0.5], 0.5, 2.0).film, 0.75);
     }
 }

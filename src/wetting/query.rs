@@ -144,7 +144,7 @@ pub(crate) fn wetness_of(water: &SurfaceWater, now: &Now, texel: u32) -> Wetness
     let Some(state) = water.texels().get(texel as usize) else { return Wetness::default() };
     let amounts = now.amounts(&now.scale(water.units(), texel), texel, state);
     let look = now.look(&amounts, state);
-    let covered = crate::material::film::layer::film_coverage(amounts.film_mm);
+    let covered = crate::material::film::layer::film_coverage(amounts.film_mm * look.film);
     let capacity = now.matter.capacity_mm;
     Wetness {
         wetness: look.wetness.max(covered) as f32,

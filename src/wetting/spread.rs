@@ -45,8 +45,8 @@ pub(crate) fn spread(water: &mut SurfaceWater, now: &Now, scratch: &mut SpreadSc
     let seconds = f64::from(stride) / f64::from(now.hz);
     for &tile in tiles.iter() {
         moves.clear();
-        collect_moves(water, now, tile, seconds, moves);
-        if moves.is_empty() {
+        let filling = collect_moves(water, now, tile, seconds, moves);
+        if moves.is_empty() && !filling {
             water.tiles.flags[tile as usize] &= !Tiles::SPREADING;
             continue;
         }
@@ -68,14 +68,16 @@ pub(crate) fn spread(water: &mut SurfaceWater, now: &Now, scratch: &mut SpreadSc
     tiles.len() as u32
 }
 
-/// What the texels of a tile give to their neighbours, each pair seen from the side that has more.
+/// What the texels of a tile give to their neighbours, each pair seen from the side that has more. Whether any of them is
+/// still filling: then there will be more to give.
 fn collect_moves(
     water: &mut SurfaceWater,
     now: &Now,
     tile: u32,
     seconds: f64,
     moves: &mut Vec<(u32, u32, u32)>,
-) {
+) -> bool {
+    let mut filling = false;
     let across = water.size / TILE_SIZE;
     let capacity = now.matter.capacity_mm;
     let least = LEAST_PART * now.material.seen_mm();
@@ -86,7 +88,9 @@ fn collect_moves(
         if water.texels[texel as usize].is_dry() {
             continue;
         }
-        let own = water.settle(now, texel).pores_mm / capacity;
+        let amounts = water.settle(now, texel);
+        filling |= amounts.film_mm > 0.0 && amounts.pores_mm < 0.999 * capacity;
+        let own = amounts.pores_mm / capacity;
         if own * capacity < least {
             continue;
         }
@@ -110,6 +114,7 @@ fn collect_moves(
             }
         }
     }
+    filling
 }
 
 #[cfg(test)]

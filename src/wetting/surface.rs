@@ -137,7 +137,7 @@ impl<'a> Now<'a> {
     /// How what it holds looks now.
     pub(crate) fn look(&self, amounts: &Amounts, water: &TexelWater) -> WaterLook {
         let seconds = f64::from(self.tick.saturating_sub(water.tick)) / f64::from(self.hz);
-        let shown = f64::from(water.shown) / 255.0;
+        let shown = [water.shown, water.filmed].map(|byte| f64::from(byte) / 255.0);
         let fill = f64::from(self.material.t_fill);
         water_look(amounts.pores_mm, self.material.seen_mm(), shown, seconds, fill)
     }
@@ -216,7 +216,7 @@ impl SurfaceWater {
             let before = water.total();
             water.film = water.film.saturating_add(units(film_mm));
             water.pores = water.pores.saturating_add(units(absorbed_mm));
-            (water.tick, water.shown) = (tick, u8::MAX);
+            (water.tick, water.shown, water.filmed) = (tick, u8::MAX, u8::MAX);
             self.ledger.received += water.total() - before;
         }
         for tile in 0..self.tiles.flags.len() as u32 {
@@ -263,7 +263,7 @@ impl SurfaceWater {
             return scale.amounts(water);
         }
         if water.is_dry() {
-            (water.tick, water.shown) = (now.tick, 0);
+            (water.tick, water.shown, water.filmed) = (now.tick, 0, 0);
             return Amounts::default();
         }
         let amounts = now.amounts(&scale, texel, water);

@@ -24,8 +24,10 @@ pub struct TexelWater {
     /// Demand that goes by before its pores dry, in 1/255 of the material's
     /// [`reserve_mm`](crate::material::PorousMaterial::reserve_mm).
     pub reserve: u8,
+    /// How much of its film was to be seen at the reference tick, 0..=255.
+    pub filmed: u8,
     /// Always 0.
-    pub pad: [u8; 2],
+    pub pad: u8,
 }
 
 impl TexelWater {
@@ -108,7 +110,9 @@ impl Scale {
         texel.film = u32::try_from(film).unwrap_or(u32::MAX);
         texel.pores = u32::try_from(pores).unwrap_or(u32::MAX);
         texel.tick = tick;
-        texel.shown = (look.wetness * 255.0).round().clamp(0.0, 255.0) as u8;
+        let byte = |part: f64| (part * 255.0).round().clamp(0.0, 255.0) as u8;
+        texel.shown = byte(look.wetness);
+        texel.filmed = if film > 0 { byte(look.film) } else { 0 };
         let reserve = if self.reserve_mm > 0.0 { amounts.reserve_mm / self.reserve_mm } else { 0.0 };
         texel.reserve = (reserve * 255.0).ceil().clamp(0.0, 255.0) as u8;
         before - texel.total()
@@ -135,7 +139,7 @@ mod tests {
     #[test]
     fn what_is_committed_adds_up() {
         let scale = Scale { unit_mm: 1.0e-6, reserve_mm: 0.05 };
-        let look = WaterLook { wetness: 0.5, gloss: 0.2 };
+        let look = WaterLook { wetness: 0.5, gloss: 0.2, film: 1.0 };
         let start = TexelWater { film: 1000, pores: 5000, tick: 1, ..Default::default() };
         let mut texel = start;
         let amounts = Amounts { film_mm: 0.0006, pores_mm: 0.0053, reserve_mm: 0.01 };

@@ -82,7 +82,7 @@ fn draw(place: &Place, porous: Option<f32>) -> Option<RgbImage> {
         let model = WettingModel::Hnat(Pores { alpha_poro, ..default() });
         for surface in [ball, floor] {
             // All that falls goes into the pores: no film.
-            let porous = PorousMaterial { model, ..still(5.0) };
+            let porous = PorousMaterial { model, ..still(1.0) };
             app.world_mut().entity_mut(surface).insert((maps, porous));
         }
         update_until(&mut app, "the maps and materials", |world| {

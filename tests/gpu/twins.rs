@@ -143,12 +143,16 @@ const TWINS: &[Twin] = &[
     Twin { wgsl: "drying::drying_sigmoid(x[0])", rust: |x| look::drying_sigmoid(x[0]) },
     Twin { wgsl: "drying::gloss_left(x[0])", rust: |x| look::gloss_left(x[0]) },
     Twin {
-        wgsl: "drying::water_look(x[0], 0.05 + x[1], x[2], 2.0 * x[3] - 0.5, 0.2 + x[4]).x",
-        rust: |x| look::water_look(x[0], 0.05 + x[1], x[2], 2.0 * x[3] - 0.5, 0.2 + x[4]).wetness,
+        wgsl: "drying::water_look(x[0], 0.05 + x[1], vec2(x[2], x[5]), 2.0 * x[3] - 0.5, 0.2 + x[4]).x",
+        rust: |x| look::water_look(x[0], 0.05 + x[1], [x[2], x[5]], 2.0 * x[3] - 0.5, 0.2 + x[4]).wetness,
     },
     Twin {
-        wgsl: "drying::water_look(x[0], 0.05 + x[1], x[2], 2.0 * x[3] - 0.5, 0.2 + x[4]).y",
-        rust: |x| look::water_look(x[0], 0.05 + x[1], x[2], 2.0 * x[3] - 0.5, 0.2 + x[4]).gloss,
+        wgsl: "drying::water_look(x[0], 0.05 + x[1], vec2(x[2], x[5]), 2.0 * x[3] - 0.5, 0.2 + x[4]).y",
+        rust: |x| look::water_look(x[0], 0.05 + x[1], [x[2], x[5]], 2.0 * x[3] - 0.5, 0.2 + x[4]).gloss,
+    },
+    Twin {
+        wgsl: "drying::water_look(x[0], 0.05 + x[1], vec2(x[2], x[5]), 2.0 * x[3] - 0.5, 0.2 + x[4]).z",
+        rust: |x| look::water_look(x[0], 0.05 + x[1], [x[2], x[5]], 2.0 * x[3] - 0.5, 0.2 + x[4]).film,
     },
     Twin {
         wgsl: "drying::evolve(drying::Amounts(x[0], x[1], 0.2 * x[2]), x[3] * x[3], 0.1 + 2.0 * x[4], 4.0 * x[5], 2.0 * x[6]).film_mm",

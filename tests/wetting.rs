@@ -1,0 +1,400 @@
+//! Water in and on surfaces, in whole apps without a renderer: arrival, run-off, drips, drying, queries, accounts.
+
+use bevy::asset::AssetPlugin;
+use bevy::mesh::MeshPlugin;
+use bevy::prelude::*;
+use bevy::time::TimeUpdateStrategy;
+use bevy_weathering::WeatheringPlugins;
+use bevy_weathering::clock::{ClockPlugin, WeatheringClock};
+use bevy_weathering::overlay::CpuOverlayPlugin;
+use bevy_weathering::particle::ParticleCounts;
+use bevy_weathering::prelude::*;
+use bevy_weathering::scenes::meshes::ground;
+use bevy_weathering::weather::Weather;
+use bevy_weathering::wetting::{
+    BecameWet, Dried, Drop, DropQueue, SurfaceWater, SurfaceWetness, WatchWetness, WetGeometry, Wetness,
+    WetnessQuery, WettingStats,
+};
+
+/// A world with surfaces, at a tick rate.
+struct Scene(App);
+
+impl Scene {
+    fn new(hz: u32) -> Self {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default(), MeshPlugin))
+            .add_plugins(WeatheringPlugins.set(ClockPlugin { hz }))
+            .add_plugins(CpuOverlayPlugin)
+            .insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
+        app.world_mut().resource_mut::<Weather>().drying_speed = 0.0;
+        app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(std::time::Duration::from_secs(3600));
+        app.finish();
+        app.cleanup();
+        Self(app)
+    }
+
+    /// A surface, when its texels are measured.
+    fn surface(&mut self, mesh: Mesh, size: u32, material: PorousMaterial, transform: Transform) -> Entity {
+        let mesh = self.0.world_mut().resource_mut::<Assets<Mesh>>().add(mesh);
+        let maps = Weatherable { map_size: size, wrap_u: Wrap::Clamp, wrap_v: Wrap::Clamp };
+        let surface = self
+            .0
+            .world_mut()
+            .spawn((maps, material, Mesh3d(mesh), transform, GlobalTransform::from(transform)))
+            .id();
+        for _ in 0..100_000 {
+            if self.0.world().get::<SurfaceWater>(surface).is_some() {
+                return surface;
+            }
+            self.0.update();
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        panic!("never measured");
+    }
+
+    fn emit(&mut self, emitter: Emitter, water_mm3: f32, stamp_radius: f32, at: Vec3) -> Entity {
+        let effect = WeatherEffect { water_mm3, stamp_radius, terminal_speed: 6.5, ..default() };
+        let effect = self.0.world_mut().resource_mut::<Assets<WeatherEffect>>().add(effect);
+        self.0.world_mut().spawn((Emitter { effect, ..emitter }, Transform::from_translation(at))).id()
+    }
+
+    fn run(&mut self, ticks: u32) {
+        self.0.insert_resource(TimeUpdateStrategy::FixedTimesteps(50));
+        for _ in 0..ticks / 50 {
+            self.0.update();
+        }
+        self.0.insert_resource(TimeUpdateStrategy::FixedTimesteps(ticks % 50));
+        self.0.update();
+        self.0.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
+    }
+
+    /// Water at a uv, without a particle.
+    fn pour(&mut self, surface: Entity, uv: Vec2, radius: i32, water_nl: u32) {
+        let size = self.water(surface).size() as f32;
+        let center = [uv.x, uv.y].map(|part| (part * size * 256.0) as i32);
+        let mut queue = self.0.world_mut().get_mut::<DropQueue>(surface).unwrap();
+        queue.0.push(Drop { center, radius: [radius * 256; 2], water_nl });
+    }
+
+    fn water(&self, surface: Entity) -> &SurfaceWater {
+        self.0.world().get::<SurfaceWater>(surface).unwrap()
+    }
+
+    fn at(&mut self, surface: Entity, uv: Vec2) -> Wetness {
+        let ask = move |query: WetnessQuery| query.at_uv(surface, uv).unwrap();
+        self.0.world_mut().run_system_once_with_nothing(ask)
+    }
+
+    fn over(&mut self, surface: Entity) -> SurfaceWetness {
+        let ask = move |query: WetnessQuery| query.over(surface).unwrap();
+        self.0.world_mut().run_system_once_with_nothing(ask)
+    }
+}
+
+/// `run_system_once`, without its error.
+trait RunOnce {
+    fn run_system_once_with_nothing<T: 'static, M>(&mut self, system: impl IntoSystem<(), T, M>) -> T;
+}
+
+impl RunOnce for World {
+    fn run_system_once_with_nothing<T: 'static, M>(&mut self, system: impl IntoSystem<(), T, M>) -> T {
+        use bevy::ecs::system::RunSystemOnce;
+        self.run_system_once(system).unwrap()
+    }
+}
+
+/// Takes up nothing.
+fn glazed() -> PorousMaterial {
+    PorousMaterial { capacity_mm: 0.0, ..default() }
+}
+
+fn brick() -> PorousMaterial {
+    PorousMaterial { capacity_mm: 3.0, sorptivity: 2.0, retained_mm: 1000.0, rim_delay: 0.0, ..default() }
+}
+
+/// A metre square of floor whose uvs are scaled about their middle.
+fn slab(uv_scale: Vec2) -> Mesh {
+    let mut mesh = ground(Vec2::ONE, UVec2::splat(4)).unwrap();
+    let Some(bevy::mesh::VertexAttributeValues::Float32x2(uvs)) = mesh.attribute_mut(Mesh::ATTRIBUTE_UV_0)
+    else {
+        panic!("it has uvs");
+    };
+    for uv in uvs {
+        *uv = ((Vec2::from_array(*uv) - 0.5) * uv_scale + 0.5).to_array();
+    }
+    mesh
+}
+
+#[test]
+fn six_minutes_of_ten_millimetres_an_hour_are_a_millimetre_whatever_the_drops_and_the_map() {
+    for (rate, size, uv_scale) in [
+        (50.0, 64, Vec2::ONE),
+        (400.0, 64, Vec2::ONE),
+        (50.0, 256, Vec2::ONE),
+        (50.0, 128, Vec2::new(0.5, 0.9)),
+        (50.0, 128, Vec2::splat(0.3)),
+    ] {
+        let mut scene = Scene::new(10);
+        let slab = scene.surface(slab(uv_scale), size, glazed(), Transform::default());
+        // A millimetre on a square metre, in 360 s.
+        let water_mm3 = 1.0e6 / 360.0 / rate;
+        let shape = EmitterShape::Sky { half_size: Vec2::splat(0.5) };
+        let emitter = Emitter { rate, shape, speed: 6.0, lifetime: 2.0, ..default() };
+        let rain = scene.emit(emitter, water_mm3, 0.02, Vec3::Y);
+        // In the first tick it asks for its effect.
+        scene.run(1);
+        scene.run(3600);
+        scene.0.world_mut().despawn(rain);
+        scene.run(30);
+        let over = scene.over(slab);
+        let depth_mm = over.film_ml / 1000.0 / over.area_m2;
+        assert!((depth_mm - 1.0).abs() < 0.01, "{rate}/s, {size}, {uv_scale}: {depth_mm} mm");
+        let middle = scene.at(slab, Vec2::splat(0.5));
+        assert!((0.3..2.0).contains(&middle.film_mm) && middle.absorbed_mm == 0.0, "{middle:?}");
+    }
+}
+
+#[test]
+fn a_film_goes_into_brick_by_the_root_of_time_and_stays_on_glaze() {
+    let mut scene = Scene::new(60);
+    let mesh = || ground(Vec2::ONE, UVec2::splat(2)).unwrap();
+    let brick = scene.surface(mesh(), 16, brick(), Transform::default());
+    let glazed = scene.surface(mesh(), 16, glazed(), Transform::from_xyz(5.0, 0.0, 0.0));
+    for surface in [brick, glazed] {
+        let geometry = scene.0.world().get::<WetGeometry>(surface).unwrap().0.clone();
+        scene.0.world_mut().get_mut::<SurfaceWater>(surface).unwrap().cover(&geometry, 0.5, 0.0, 1);
+    }
+    scene.run(1);
+    for expected in [0.258199, 0.365148, 0.447214, 0.5] {
+        scene.run(60);
+        let here = scene.at(brick, Vec2::splat(0.4));
+        assert!((here.absorbed_mm - expected).abs() < 2e-5, "{here:?} {expected}");
+        assert!((here.film_mm + here.absorbed_mm - 0.5).abs() < 2e-5);
+        let glaze = scene.at(glazed, Vec2::splat(0.4));
+        assert!((glaze.film_mm - 0.5).abs() < 1e-5 && glaze.absorbed_mm == 0.0 && glaze.wetness > 0.999);
+    }
+}
+
+#[test]
+fn film_dries_before_pores_gloss_and_the_rim_before_the_middle_and_puddles_last() {
+    let mut scene = Scene::new(60);
+    let material =
+        PorousMaterial { capacity_mm: 0.2, visible_mm: 0.2, rim_delay: 1.0, retained_mm: 5.0, ..default() };
+    let wall =
+        scene.surface(ground(Vec2::ONE, UVec2::splat(2)).unwrap(), 128, material, Transform::default());
+    // A patch with full pores and a puddle in its middle.
+    for _ in 0..3 {
+        scene.pour(wall, Vec2::splat(0.5), 30, 30_000_000);
+    }
+    scene.pour(wall, Vec2::splat(0.5), 6, 12_000_000);
+    scene.run(120);
+    let start = scene.at(wall, Vec2::splat(0.5));
+    assert!(start.film_mm > 1.0 && start.saturation > 0.99, "{start:?}");
+    scene.0.world_mut().resource_mut::<Weather>().drying_speed = 600.0;
+    // The first time at which a place looks half dry.
+    let places = [Vec2::new(0.5, 0.5), Vec2::new(0.5, 0.56), Vec2::new(0.5, 0.62), Vec2::new(0.5, 0.655)];
+    let mut dry_at = [None; 4];
+    let mut film_gone = None;
+    for second in 0..600 {
+        for (place, dry_at) in places.iter().zip(&mut dry_at) {
+            let here = scene.at(wall, *place);
+            if here.wetness < 0.5 {
+                dry_at.get_or_insert(second);
+            }
+        }
+        let middle = scene.at(wall, places[1]);
+        if middle.film_mm == 0.0 {
+            film_gone.get_or_insert((second, middle.saturation));
+        }
+        scene.run(60);
+    }
+    let dry_at = dry_at.map(|second| second.expect("it dries"));
+    assert!(dry_at[0] > dry_at[1] + 5 && dry_at[1] > dry_at[2] && dry_at[2] > dry_at[3], "{dry_at:?}");
+    let (film_gone, saturation) = film_gone.unwrap();
+    assert!(film_gone < dry_at[1] && saturation > 0.9, "{film_gone} {saturation}");
+}
+
+#[test]
+fn what_is_wetted_again_when_half_dry_goes_on_without_a_jump() {
+    let mut scene = Scene::new(60);
+    let material =
+        PorousMaterial { capacity_mm: 0.2, visible_mm: 0.2, t_fill: 1.0, rim_delay: 0.0, ..default() };
+    let wall = scene.surface(ground(Vec2::ONE, UVec2::splat(2)).unwrap(), 32, material, Transform::default());
+    let geometry = scene.0.world().get::<WetGeometry>(wall).unwrap().0.clone();
+    scene.0.world_mut().get_mut::<SurfaceWater>(wall).unwrap().cover(&geometry, 0.0, 0.2, 1);
+    scene.0.world_mut().resource_mut::<Weather>().drying_speed = 600.0;
+    let middle = Vec2::splat(0.5);
+    let mut before = scene.at(wall, middle);
+    let (mut least, mut most_after) = (1.0f32, 0.0f32);
+    for tick in 0..1200 {
+        if before.wetness < 0.5 && least > before.wetness && tick < 900 {
+            least = least.min(before.wetness);
+            if least < 0.45 {
+                scene.pour(wall, middle, 12, 6_000_000);
+            }
+        }
+        scene.run(1);
+        let now = scene.at(wall, middle);
+        assert!((now.wetness - before.wetness).abs() < 0.03, "{tick}: {before:?} {now:?}");
+        if least < 0.45 {
+            most_after = most_after.max(now.wetness);
+        }
+        before = now;
+    }
+    assert!(least < 0.45 && most_after > 0.9, "{least} {most_after}");
+}
+
+#[test]
+fn a_surface_at_rest_costs_nothing() {
+    let mut scene = Scene::new(60);
+    let wall = scene.surface(ground(Vec2::ONE, UVec2::splat(2)).unwrap(), 128, brick(), Transform::default());
+    scene.pour(wall, Vec2::splat(0.5), 10, 5_000_000);
+    scene.run(60 * 600);
+    assert!(scene.water(wall).is_at_rest());
+    let counters = |scene: &Scene| {
+        let stats = scene.0.world().resource::<WettingStats>();
+        [stats.drops(), stats.tiles_run(), stats.tiles_spread(), stats.rims()]
+    };
+    let (before, texels) = (counters(&scene), scene.water(wall).texels().to_vec());
+    assert!(before[0] == 1 && before[2] > 0, "{before:?}");
+    scene.0.world_mut().resource_mut::<Weather>().drying_speed = 50.0;
+    let wet = scene.over(wall);
+    scene.run(6000);
+    // It has dried in the meantime, without a step, and without a change to what it holds.
+    assert!(scene.over(wall).absorbed_ml < wet.absorbed_ml);
+    assert_eq!((counters(&scene), scene.water(wall).texels()), (before, texels.as_slice()));
+}
+
+#[test]
+fn water_runs_down_a_wall_drips_from_its_edge_and_wets_what_is_below() {
+    let mut scene = Scene::new(60);
+    let smooth = PorousMaterial { capacity_mm: 0.0, retained_mm: 0.05, ..default() };
+    let upright =
+        Transform::from_xyz(0.0, 1.5, 0.0).with_rotation(Quat::from_rotation_x(std::f32::consts::FRAC_PI_2));
+    let wall = scene.surface(ground(Vec2::ONE, UVec2::splat(3)).unwrap(), 128, smooth, upright);
+    let floor = scene.surface(
+        ground(Vec2::splat(3.0), UVec2::splat(3)).unwrap(),
+        128,
+        glazed(),
+        Transform::default(),
+    );
+    // 40 ml near the upper edge; v runs down.
+    for _ in 0..20 {
+        scene.pour(wall, Vec2::new(0.5, 0.1), 5, 2_000_000);
+        scene.run(10);
+    }
+    let upper = scene.at(wall, Vec2::new(0.5, 0.1)).film_mm;
+    assert!(scene.at(wall, Vec2::new(0.5, 0.9)).film_mm < upper);
+    scene.run(60 * 40);
+    assert!(scene.at(wall, Vec2::new(0.5, 0.1)).film_mm < 0.15, "it has run down");
+    let (wall_ledger, floor_ledger) = (scene.water(wall).ledger(), scene.water(floor).ledger());
+    assert!(wall_ledger.dripped > wall_ledger.received / 4, "{wall_ledger:?}");
+    let nl = |surface: Entity, units: u64| scene.water(surface).units().whole_nl(units);
+    assert_eq!(
+        nl(floor, floor_ledger.received),
+        nl(wall, wall_ledger.dripped),
+        "all drips land on the floor"
+    );
+    // Right below the wall, not beside it.
+    assert!(
+        scene.at(floor, Vec2::new(0.5, 0.5)).film_mm > 0.0
+            || scene.at(floor, Vec2::new(0.5, 0.51)).film_mm > 0.0
+    );
+    assert_eq!(scene.at(floor, Vec2::new(0.9, 0.5)).film_mm, 0.0);
+    let counts = *scene.0.world().resource::<ParticleCounts>();
+    assert!(counts.hit > 0 && counts.hit == counts.emitted, "{counts:?}");
+}
+
+#[test]
+fn water_collects_in_hollows_and_stands_level() {
+    let mut scene = Scene::new(60);
+    // A bowl: 10 mm deep in the middle.
+    let mut mesh = ground(Vec2::ONE, UVec2::splat(40)).unwrap();
+    let Some(bevy::mesh::VertexAttributeValues::Float32x3(positions)) =
+        mesh.attribute_mut(Mesh::ATTRIBUTE_POSITION)
+    else {
+        panic!("it has positions");
+    };
+    for position in positions {
+        let distance = (position[0] * position[0] + position[2] * position[2]).sqrt();
+        position[1] = 0.02 * distance;
+    }
+    let smooth = PorousMaterial { capacity_mm: 0.0, retained_mm: 0.05, ..default() };
+    let bowl = scene.surface(mesh, 64, smooth, Transform::default());
+    scene.pour(bowl, Vec2::new(0.5, 0.2), 6, 100_000_000);
+    scene.run(60 * 60);
+    let depth = |scene: &mut Scene, u: f32, v: f32| scene.at(bowl, Vec2::new(u, v)).film_mm;
+    let (middle, slope) = (depth(&mut scene, 0.5, 0.5), depth(&mut scene, 0.5, 0.3));
+    assert!(middle > 1.5 && slope < 0.2, "{middle} {slope}");
+    // Level: deeper by as much as the ground is lower.
+    let off = 0.06;
+    let aside = depth(&mut scene, 0.5 + off, 0.5);
+    assert!((middle - aside - 20.0 * off).abs() < 0.5, "{middle} {aside}");
+    assert!(scene.water(bowl).is_at_rest(), "a pool that is level is at rest");
+}
+
+#[test]
+fn wet_patches_spread_in_the_pores_and_stop() {
+    let mut scene = Scene::new(60);
+    let material = PorousMaterial { retained_mm: 1000.0, capacity_mm: 0.3, visible_mm: 0.1, ..brick() };
+    let wall =
+        scene.surface(ground(Vec2::splat(0.2), UVec2::splat(2)).unwrap(), 64, material, Transform::default());
+    for _ in 0..4 {
+        scene.pour(wall, Vec2::splat(0.5), 8, 250_000);
+    }
+    scene.run(30);
+    let before = scene.over(wall);
+    scene.run(60 * 30);
+    let after = scene.over(wall);
+    assert!(after.wet_fraction > 1.08 * before.wet_fraction, "{before:?} {after:?}");
+    assert!((after.absorbed_ml + after.film_ml - before.absorbed_ml - before.film_ml).abs() < 1e-5);
+    scene.run(60 * 300);
+    assert!(scene.water(wall).is_at_rest());
+}
+
+/// Messages that came, of each kind.
+#[derive(Resource, Default)]
+struct Told((u32, u32));
+
+fn listen(mut wet: MessageReader<BecameWet>, mut dried: MessageReader<Dried>, mut told: ResMut<Told>) {
+    told.0.0 += wet.read().count() as u32;
+    told.0.1 += dried.read().count() as u32;
+}
+
+#[test]
+fn games_can_ask_and_are_told() {
+    let mut scene = Scene::new(60);
+    let material = PorousMaterial { capacity_mm: 0.1, visible_mm: 0.1, rim_delay: 0.0, ..default() };
+    let floor = scene.surface(
+        ground(Vec2::ONE, UVec2::splat(2)).unwrap(),
+        64,
+        material,
+        Transform::from_xyz(0.0, 1.0, 0.0).with_scale(Vec3::splat(2.0)),
+    );
+    scene.0.world_mut().entity_mut(floor).insert(WatchWetness::default());
+    let nobody = scene.0.world_mut().spawn_empty().id();
+    let ask = move |query: WetnessQuery| {
+        (
+            query.at_point(floor, Vec3::new(0.02, 1.05, 0.03)),
+            query.at_point(floor, Vec3::new(0.9, 0.95, 0.9)),
+            query.at_point(floor, Vec3::new(0.0, 3.0, 0.0)),
+            query.at_uv(nobody, Vec2::splat(0.5)),
+        )
+    };
+    scene.0.init_resource::<Told>().add_systems(WeatheringTick, listen.in_set(WeatheringSystems::Last));
+    let told = |scene: &mut Scene| std::mem::take(&mut *scene.0.world_mut().resource_mut::<Told>()).0;
+    assert_eq!(told(&mut scene), (0, 0));
+    scene.pour(floor, Vec2::splat(0.5), 28, 400_000_000);
+    scene.run(60);
+    let (middle, corner, far, none) = scene.0.world_mut().run_system_once_with_nothing(ask);
+    assert!(middle.unwrap().wetness > 0.9 && corner.unwrap().wetness < 0.1, "{middle:?} {corner:?}");
+    assert_eq!((far, none), (None, None));
+    assert_eq!(told(&mut scene), (1, 0));
+    let over = scene.over(floor);
+    assert!((over.area_m2 - 4.0).abs() < 1e-3 && over.wet_fraction > 0.2, "{over:?}");
+    assert!((over.film_ml + over.absorbed_ml - 400.0).abs() < 0.1, "{over:?}");
+    scene.0.world_mut().resource_mut::<Weather>().drying_speed = 3000.0;
+    scene.run(60 * 60);
+    assert_eq!(told(&mut scene), (0, 1));
+    assert!(scene.0.world().resource::<WeatheringClock>().tick() > 0);
+}
