@@ -74,9 +74,9 @@ fn gloss_left(u: f32) -> f32 {
     return (exp(-saturate(u) / GLOSS_LIFE) - end) / (1.0 - end);
 }
 
-// How absorbed water looks: wetness and gloss.
-fn water_look(pores_mm: f32, visible_mm: f32, shown: f32, seconds: f32, t_fill: f32) -> vec2<f32> {
+// How absorbed water looks, wetness and gloss, and how much of a film is to be seen.
+fn water_look(pores_mm: f32, visible_mm: f32, shown: vec2<f32>, seconds: f32, t_fill: f32) -> vec3<f32> {
     let gone = 1.0 - min(pores_mm / visible_mm, 1.0);
-    let ramp = select(0.0, shown + seconds / max(t_fill, 1e-6), seconds >= 0.0);
-    return min(vec2(1.0 - drying_sigmoid(gone), gloss_left(gone)), vec2(ramp));
+    let ramp = select(vec2(0.0), shown + seconds / max(t_fill, 1e-6), seconds >= 0.0);
+    return min(vec3(1.0 - drying_sigmoid(gone), gloss_left(gone), 1.0), ramp.xxy);
 }

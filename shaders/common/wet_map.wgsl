@@ -75,7 +75,7 @@ struct TexelWater {
     tick: u32,
     // From the lowest byte: how wet it looked then, exposure to air and to the sun, reserve.
     bytes: u32,
-    // Efflorescence, tide mark.
+    // Efflorescence, tide mark, how much of the film was to be seen.
     marks: u32,
 }
 
@@ -211,7 +211,8 @@ fn texel_held(texel: vec2<i32>) -> Held {
     let tile = (y / TILE_SIZE) * (size / TILE_SIZE) + x / TILE_SIZE;
     let stored = state[tile * TILE_SIZE * TILE_SIZE + (y % TILE_SIZE) * TILE_SIZE + x % TILE_SIZE];
     var held: Held;
-    held.marks = unpack4x8unorm(stored.marks).xy;
+    let marks = unpack4x8unorm(stored.marks);
+    held.marks = marks.xy;
     if stored.tick == 0u || stored.tick > clock.tick {
         return held;
     }
@@ -222,7 +223,9 @@ fn texel_held(texel: vec2<i32>) -> Held {
     // The byte of the air's share is 128 where it is 1.
     let demand = dot(demand_since(stored.tick), vec2(bytes.y * (255.0 / 128.0), bytes.z));
     let now = evolve(before, porous.sorptivity_squared, porous.capacity_mm, seconds, demand);
-    held.look = vec3(water_look(now.pores_mm, porous.visible_mm, bytes.x, seconds, porous.t_fill), now.film_mm);
+    let shown = vec2(bytes.x, marks.z);
+    held.look = water_look(now.pores_mm, porous.visible_mm, shown, seconds, porous.t_fill);
+    held.look.z *= now.film_mm;
 #ifdef WEATHERED_MARKS
     let dried = max(before.pores_mm - now.film_mm - now.pores_mm, 0.0) / MARK_FULL_MM;
     let rim = max(1.0 - 3.0 * bytes.w, 0.0);

@@ -25,7 +25,7 @@ pub use app::{require_adapter, task_pools};
 pub use capture::write_png;
 pub use files::write_atomic;
 pub use maps::SurfaceMaps;
-pub use report::{ParticleReport, Report, SurfaceReport, Timing, WaterReport};
+pub use report::{ParticleReport, Report, SurfaceReport, Timing, WaterReport, WorkReport};
 
 /// What to run and what to write.
 #[derive(Debug, Clone)]

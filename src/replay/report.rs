@@ -10,7 +10,7 @@ use crate::emitter::{EmissionSeed, NewParticles};
 use crate::overlay::SurfaceTotals;
 use crate::particle::{ParticleCounts, Volume, WaterCounts};
 use crate::scenario::{Digest, ScenarioSurface, amounts_digest};
-use crate::wetting::DripEffect;
+use crate::wetting::{DripEffect, WettingStats};
 
 /// `report.json`.
 #[derive(Serialize, Debug, Clone)]
@@ -27,6 +27,8 @@ pub struct Report {
     pub particles: ParticleReport,
     /// All water.
     pub water: WaterReport,
+    /// What moving it took.
+    pub work: WorkReport,
     /// In the order of the scenario.
     pub surfaces: Vec<SurfaceReport>,
     /// Hash over all impacts and all amounts; see [`amounts_digest`].
@@ -92,6 +94,17 @@ pub struct WaterReport {
     pub imbalance: f64,
 }
 
+/// Steps that moving water took; see [`WettingStats`].
+#[derive(Serialize, Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WorkReport {
+    /// Drops soaked up.
+    pub drops: u64,
+    /// Steps of tiles with films that run.
+    pub tiles_run: u64,
+    /// Steps of tiles whose pores share water.
+    pub tiles_spread: u64,
+}
+
 /// Where the time went.
 #[derive(Serialize, Debug, Clone, Copy, PartialEq)]
 pub struct Timing {
@@ -138,6 +151,7 @@ pub(super) fn report(
     let clock = *world.resource::<WeatheringClock>();
     let counts = *world.resource::<ParticleCounts>();
     let digest = world.resource::<Digest>();
+    let stats = world.resource::<WettingStats>();
     Report {
         scenario: options.scenario.file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         seed: world.resource::<EmissionSeed>().0,
@@ -151,6 +165,11 @@ pub(super) fn report(
             refused: counts.refused,
         },
         water,
+        work: WorkReport {
+            drops: stats.drops(),
+            tiles_run: stats.tiles_run(),
+            tiles_spread: stats.tiles_spread(),
+        },
         surfaces: surfaces.into_iter().map(|(_, row)| row).collect(),
         digest: amounts_digest(digest, maps.iter().map(|maps| &maps.water)),
         timing,

@@ -190,6 +190,13 @@ fn generate(mesh: &MeshSpec) -> Option<Result<Mesh, MeshError>> {
         MeshSpec::Rock { radius, sectors, stacks, seed } => Some(meshes::rock(radius, sectors, stacks, seed)),
         MeshSpec::Road { size, cells, seed } => Some(meshes::road(size, cells, seed)),
         MeshSpec::Cloth { size, cells } => Some(meshes::cloth(size, cells)),
+        MeshSpec::BasRelief { size, depth, cells, seed } => {
+            Some(meshes::bas_relief(size, depth, cells, seed))
+        }
+        MeshSpec::Stair { width, steps, rise, going, hollow, cells, seed } => {
+            Some(meshes::stair(width, steps, rise, going, hollow, cells, seed))
+        }
+        MeshSpec::Roof { size, pitch_deg, tiles, cells } => Some(meshes::roof(size, pitch_deg, tiles, cells)),
         MeshSpec::File(_) => None,
     }
 }

@@ -402,6 +402,45 @@ pub enum MeshSpec {
         /// Along x and y.
         cells: UVec2,
     },
+    /// An upright carved stone plate that faces +z, its lower edge at the origin.
+    BasRelief {
+        /// Along x and y.
+        size: Vec2,
+        /// Of the carving, metres.
+        depth: f32,
+        /// Along x and y, over the front.
+        cells: UVec2,
+        /// Another one, other wear.
+        seed: u32,
+    },
+    /// A flight of worn stone steps that goes down towards +z.
+    Stair {
+        /// Along x, metres.
+        width: f32,
+        /// How many.
+        steps: u32,
+        /// Height of a step, metres.
+        rise: f32,
+        /// Depth of a tread, metres.
+        going: f32,
+        /// How deep the treads are worn, metres.
+        hollow: f32,
+        /// Across the width and along a tread.
+        cells: UVec2,
+        /// Another one, worn elsewhere.
+        seed: u32,
+    },
+    /// A slope of tiles that goes down towards +z.
+    Roof {
+        /// Along x and down the slope.
+        size: Vec2,
+        /// Slope.
+        pitch_deg: f32,
+        /// Along x and down the slope.
+        tiles: UVec2,
+        /// Across a tile and along it.
+        cells: u32,
+    },
     /// The first mesh of a `.glb` or `.gltf`.
     File(String),
 }

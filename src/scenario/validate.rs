@@ -18,6 +18,11 @@ use crate::particle::Lifespan;
 /// The farthest coordinate: beyond it an f32 is coarser than a drop.
 const FAR: f32 = 1.0e5;
 
+/// A product of absurd counts is as large as can be, not small.
+fn product(factors: [u64; 4]) -> u64 {
+    factors.into_iter().fold(1, u64::saturating_mul)
+}
+
 impl LoadedScenario {
     /// Checks every value and that every named file exists.
     ///
@@ -164,6 +169,27 @@ impl LoadedScenario {
             MeshSpec::Sphere { radius, sectors, stacks } | MeshSpec::Rock { radius, sectors, stacks, .. } => {
                 self.positive(&format!("{field}.mesh.radius"), *radius, FAR)?;
                 u64::from(*sectors) * u64::from(*stacks) * 2
+            }
+            MeshSpec::BasRelief { size, depth, cells, .. } => {
+                self.positive(&format!("{field}.mesh.size.x"), size.x, FAR)?;
+                self.positive(&format!("{field}.mesh.size.y"), size.y, FAR)?;
+                self.positive(&format!("{field}.mesh.depth"), *depth, FAR)?;
+                product([1, 2, u64::from(cells.x) + 12, u64::from(cells.y) + 12])
+            }
+            MeshSpec::Stair { width, steps, rise, going, hollow, cells, .. } => {
+                for (name, value) in [("width", width), ("rise", rise), ("going", going)] {
+                    self.positive(&format!("{field}.mesh.{name}"), *value, FAR)?;
+                }
+                self.positive(&format!("{field}.mesh.hollow"), *hollow, rise / 4.0)?;
+                let rows = u64::from(cells.y) + u64::from(cells.y.div_ceil(2)) + 9;
+                product([2, u64::from(*steps), u64::from(cells.x) + 2, rows])
+            }
+            MeshSpec::Roof { size, pitch_deg, tiles, cells } => {
+                self.positive(&format!("{field}.mesh.size.x"), size.x, FAR)?;
+                self.positive(&format!("{field}.mesh.size.y"), size.y, FAR)?;
+                self.positive(&format!("{field}.mesh.pitch_deg"), *pitch_deg, 59.99)?;
+                let rows = u64::from(tiles.y) * (u64::from(*cells) + 1);
+                product([4, u64::from(tiles.x), u64::from(*cells) + 4, rows + 4])
             }
             MeshSpec::Vase { height, segments, rings } | MeshSpec::Flowerpot { height, segments, rings } => {
                 self.positive(&format!("{field}.mesh.height"), *height, FAR)?;

@@ -48,8 +48,7 @@ pub fn evolve(before: Amounts, matter: Matter, seconds: f64, demand_mm: f64) -> 
     // May hold more than its capacity: when the material was exchanged.
     let full = matter.capacity_mm.max(pores);
     let squared = matter.sorptivity_squared;
-    let filled = |seconds: f64| (pores * pores + squared * seconds).sqrt().min(full);
-    let soaked = filled(seconds);
+    let soaked = if pores < full { (pores * pores + squared * seconds).sqrt().min(full) } else { full };
     let left = film - (soaked - pores) - demand_mm;
     if left >= 0.0 {
         return Amounts { film_mm: left, pores_mm: soaked, reserve_mm: reserve };

@@ -26,10 +26,12 @@ pub const STEPS_PER_SECOND: u32 = 30;
 pub const LEAST_RETAINED: f64 = 0.5;
 const MOST_RETAINED: f64 = 1.7;
 
-/// Differences of level that surface tension bridges, mm.
-const LEVEL_MM: f32 = 0.02;
+/// Differences of depth that surface tension bridges, mm: on level ground, films this uneven lie still.
+const BRIDGED_MM: f32 = 0.1;
+/// Water runs where its surface falls by more than this to the next texel, mm.
+const LEVEL_MM: f32 = 0.01;
 /// A step moves no less than this, mm: what would creep is at rest.
-const LEAST_MOVE_MM: f32 = 5.0e-4;
+const LEAST_MOVE_MM: f32 = 1.0e-3;
 /// A film on a level edge holds until it is this deep: the capillary length of water, mm.
 const EDGE_HOLDS_MM: f32 = 2.73;
 /// A drop falls when it is this large, mm³ (a dripping tap: 20 to 50), or so deep, mm.
@@ -40,12 +42,29 @@ const OVERHANG: f32 = -0.25;
 
 const TILE_TEXELS: usize = (TILE_SIZE * TILE_SIZE) as usize;
 
+/// A tile in which nothing moves faster than this part of a texel a step takes its next step after twice the time; one in
+/// which something moves faster than the other, after half of it.
+const SLOW: f32 = 0.1;
+const FAST: f32 = 0.4;
+/// So often can the time be doubled.
+const MOST_PATIENCE: u8 = 3;
+
 /// Buffers that keep their memory from tick to tick.
 #[derive(Debug)]
 pub(crate) struct RunScratch {
     film_mm: [f32; TILE_TEXELS],
-    moves: Vec<(u32, u32, u32)>,
+    moves: Vec<Move>,
     tiles: Vec<u32>,
+}
+
+/// Water from one texel to another.
+#[derive(Debug, Clone, Copy)]
+struct Move {
+    from: u32,
+    to: u32,
+    units: u32,
+    /// Both are well inside one tile.
+    inside: bool,
 }
 
 impl Default for RunScratch {
@@ -59,7 +78,7 @@ pub(crate) fn stride(hz: u32) -> u32 {
     (hz / STEPS_PER_SECOND).max(1)
 }
 
-/// Moves what runs in this tick. Tiles take turns like the squares of a chessboard.
+/// Moves what runs in this tick; returns how many tiles took a step. Tiles take turns like the squares of a chessboard.
 pub(crate) fn run_off(
     water: &mut SurfaceWater,
     now: &Now,
@@ -68,18 +87,33 @@ pub(crate) fn run_off(
 ) -> u32 {
     let stride = stride(now.hz);
     let across = water.size / TILE_SIZE;
-    let phase = now.tick % stride;
+    let (phase, round) = (now.tick % stride, now.tick / stride);
     let mut due = std::mem::take(&mut scratch.tiles);
     due.clear();
-    due.extend(water.tiles.running.iter().copied().filter(|tile| {
+    due.extend(water.tiles.running.iter().copied().filter(|&tile| {
         let color = (tile % across + tile / across) % 2;
-        color * (stride / 2) == phase
+        let patience = water.tiles.patience[tile as usize];
+        color * (stride / 2) == phase && (round + tile) % (1 << patience) == 0
     }));
     due.sort_unstable();
-    let seconds = stride as f32 / now.hz as f32;
     for &tile in &due {
-        if !step_tile(water, now, tile, seconds, scratch, drips) {
-            water.tiles.flags[tile as usize] &= !Tiles::RUNNING;
+        let patience = water.tiles.patience[tile as usize];
+        let seconds = (stride << patience) as f32 / now.hz as f32;
+        match step_tile(water, now, tile, seconds, scratch, drips) {
+            None => {
+                water.tiles.flags[tile as usize] &= !Tiles::RUNNING;
+                water.tiles.patience[tile as usize] = 0;
+            }
+            Some(fastest) => {
+                let patience = if fastest > FAST {
+                    patience.saturating_sub(1)
+                } else if fastest < SLOW {
+                    (patience + 1).min(MOST_PATIENCE)
+                } else {
+                    patience
+                };
+                water.tiles.patience[tile as usize] = patience;
+            }
         }
     }
     if !due.is_empty() {
@@ -91,7 +125,7 @@ pub(crate) fn run_off(
     count
 }
 
-/// One step of one tile; whether anything moved.
+/// One step of one tile. The part of a texel that the fastest of it moved; none if nothing moved.
 fn step_tile(
     water: &mut SurfaceWater,
     now: &Now,
@@ -99,8 +133,7 @@ fn step_tile(
     seconds: f32,
     scratch: &mut RunScratch,
     drips: &mut Vec<Drip>,
-) -> bool {
-    let mut pool = false;
+) -> Option<f32> {
     for local in 0..TILE_TEXELS {
         let texel = texel_in(water.size, tile, local);
         let film = film_now(water, now, texel);
@@ -111,22 +144,27 @@ fn step_tile(
     }
     let mut moves = std::mem::take(&mut scratch.moves);
     moves.clear();
-    let mut shed = false;
+    let (mut shed, mut pool, mut fastest) = (false, false, 0.0f32);
     for local in 0..TILE_TEXELS {
         let film = scratch.film_mm[local];
+        if f64::from(film) <= LEAST_RETAINED * f64::from(now.material.retained_mm) {
+            continue;
+        }
         let texel = texel_in(water.size, tile, local);
         let excess = film - retained(now, texel);
         if excess <= 0.0 || now.geometry.area_mm2()[texel as usize] <= 0.0 {
             continue;
         }
-        let donor = Donor { texel, film, excess };
-        pool |= true;
-        if let Some(site) = give(water, now, tile, &donor, seconds, &scratch.film_mm, &mut moves) {
+        let donor = Donor { texel, local, tile, film, excess };
+        pool = true;
+        let (site, speed) = give(water, now, &donor, seconds, &scratch.film_mm, &mut moves);
+        fastest = fastest.max(speed);
+        if let Some(site) = site {
             shed |= shed_drop(water, now, &donor, site, drips);
         }
     }
-    for &(from, to, units) in &moves {
-        carry(water, now, from, to, units);
+    for step in &moves {
+        carry(water, now, tile, step);
     }
     let moved = !moves.is_empty() || shed;
     scratch.moves = moves;
@@ -135,45 +173,66 @@ fn step_tile(
     if moved {
         water.tiles.touch(tile);
     }
-    moved
+    moved.then_some(fastest)
 }
 
 struct Donor {
     texel: u32,
+    local: usize,
+    tile: u32,
     film: f32,
     excess: f32,
 }
 
+impl Donor {
+    /// Whether all its neighbours in the image lie in its tile.
+    fn is_inside(&self) -> bool {
+        const LAST: usize = TILE_SIZE as usize - 1;
+        let (x, y) = (self.local % TILE_SIZE as usize, self.local / TILE_SIZE as usize);
+        x > 0 && x < LAST && y > 0 && y < LAST
+    }
+}
+
 /// Writes down what a texel gives to which neighbours. Where there is an end of the mesh below it, or nothing lower while
-/// it overhangs, returns where a drop would leave.
+/// it overhangs, returns where a drop would leave; and the part of a texel that its water moves.
 fn give(
     water: &SurfaceWater,
     now: &Now,
-    tile: u32,
     donor: &Donor,
     seconds: f32,
     films: &[f32; TILE_TEXELS],
-    moves: &mut Vec<(u32, u32, u32)>,
-) -> Option<DripSite> {
+    moves: &mut Vec<Move>,
+) -> (Option<DripSite>, f32) {
     let geometry = now.geometry;
     let heights = geometry.height();
-    let level =
-        |texel: u32, film: f32| heights[texel as usize] * 1000.0 + geometry.facing_up(texel).max(0.0) * film;
-    let own_level = level(donor.texel, donor.film);
-    let mut out = [(0u32, 0.0f32); 4];
-    let mut site = None;
-    let mut lower = false;
-    for (slot, side) in out.iter_mut().zip(Side::ALL) {
+    let depth = |texel: u32, film: f32| geometry.facing_up(texel).max(0.0) * film;
+    let (own_height, own_depth) = (heights[donor.texel as usize], depth(donor.texel, donor.film));
+    let is_inside = donor.is_inside();
+    let beside = [
+        donor.local.wrapping_sub(1),
+        donor.local + 1,
+        donor.local.wrapping_sub(TILE_SIZE as usize),
+        donor.local + TILE_SIZE as usize,
+    ];
+    let mut out = [(0u32, 0.0f32, false); 4];
+    let (mut site, mut lower, mut fastest) = (None, false, 0.0f32);
+    for (number, side) in Side::ALL.into_iter().enumerate() {
         let distance = geometry.distance(donor.texel, side).max(1e-6);
         match geometry.link(donor.texel, side) {
             Link::Texel(other) => {
-                let drop_mm = own_level - level(other, neighbour_film(water, now, tile, other, films));
+                // Most neighbours are those in the image.
+                let inside = is_inside && texel_in(water.size, donor.tile, beside[number]) == other;
+                let film = if inside { films[beside[number]] } else { film_now(water, now, other) };
+                let deeper = own_depth - depth(other, film);
+                let deeper = deeper - deeper.clamp(-BRIDGED_MM, BRIDGED_MM);
+                let drop_mm = (own_height - heights[other as usize]) * 1000.0 + deeper;
                 if drop_mm <= LEVEL_MM {
                     continue;
                 }
                 lower = true;
                 let courant = speed(donor.film, drop_mm, distance) * seconds / distance;
-                *slot = (other, (courant * donor.excess).min(0.25 * drop_mm));
+                fastest = fastest.max(courant.min(0.25 * drop_mm / donor.excess));
+                out[number] = (other, (courant * donor.excess).min(0.25 * drop_mm), inside);
             }
             Link::Edge => {
                 let rise = match geometry.link(donor.texel, side.opposite()) {
@@ -186,20 +245,20 @@ fn give(
             }
         }
     }
-    let sum: f32 = out.iter().map(|(_, mm)| mm).sum();
+    let sum: f32 = out.iter().map(|(_, mm, _)| mm).sum();
     let most = 0.9 * donor.excess;
     let scale = if sum > most { most / sum } else { 1.0 };
     let unit_mm = now.scale(water.units, donor.texel).unit_mm as f32;
-    for (other, mm) in out {
+    for (to, mm, inside) in out {
         let mm = mm * scale;
         if mm > LEAST_MOVE_MM {
-            moves.push((donor.texel, other, (mm / unit_mm) as u32));
+            moves.push(Move { from: donor.texel, to, units: (mm / unit_mm) as u32, inside });
         }
     }
     if site.is_none() && !lower && geometry.facing_up(donor.texel) < OVERHANG {
         site = Some(DripSite::Overhang);
     }
-    site
+    (site, fastest)
 }
 
 /// Mean speed of a film, m/s: `g h² sin b / (3 nu)`, with nu = 1e-6 m²/s.
@@ -223,42 +282,45 @@ fn texel_in(size: u32, tile: u32, local: usize) -> u32 {
     (tile / across * TILE_SIZE + y) * size + tile % across * TILE_SIZE + x
 }
 
-/// The film of a texel now, mm, without settling it.
+/// The film of a texel now, mm, without settling it. Where less than the least retained film lay at its reference time,
+/// that: it cannot run, and whether it has shrunk since makes no difference to what comes.
 fn film_now(water: &SurfaceWater, now: &Now, texel: u32) -> f32 {
     let state = &water.texels[texel as usize];
     if state.film == 0 {
         return 0.0;
     }
-    now.amounts(&now.scale(water.units, texel), texel, state).film_mm as f32
-}
-
-fn neighbour_film(water: &SurfaceWater, now: &Now, tile: u32, texel: u32, films: &[f32; TILE_TEXELS]) -> f32 {
-    if water.tile_of(texel) == tile {
-        let (x, y) = (texel % water.size % TILE_SIZE, texel / water.size % TILE_SIZE);
-        return films[(y * TILE_SIZE + x) as usize];
+    let scale = now.scale(water.units, texel);
+    let stored = f64::from(state.film) * scale.unit_mm;
+    if stored <= LEAST_RETAINED * f64::from(now.material.retained_mm) || state.tick == now.tick {
+        return stored as f32;
     }
-    film_now(water, now, texel)
+    now.amounts(&scale, texel, state).film_mm as f32
 }
 
 /// Moves water. The donor's reference time stays: its film has not run out since then and does not now, so what it loses
 /// can be taken from what it had then. So nothing is rounded while it flows.
-fn carry(water: &mut SurfaceWater, now: &Now, from: u32, to: u32, units: u32) {
+fn carry(water: &mut SurfaceWater, now: &Now, tile: u32, step: &Move) {
+    let &Move { from, to, units, inside } = step;
     let room = u32::MAX - water.texels[to as usize].film;
     let units = units.min(room).min(water.texels[from as usize].film);
     water.texels[from as usize].film -= units;
-    if film_now(water, now, to) > 0.0 {
-        water.texels[to as usize].film += units;
-    } else {
+    let film = water.texels[to as usize].film;
+    let least = LEAST_RETAINED * f64::from(now.material.retained_mm);
+    if film == 0 || f64::from(film) * now.scale(water.units, to).unit_mm <= least {
+        // It may have run dry in the meantime.
         water.settle(now, to);
-        water.texels[to as usize].film += units;
     }
-    let (source, target) = (water.tile_of(from), water.tile_of(to));
+    water.texels[to as usize].film += units;
+    if inside {
+        return;
+    }
+    let target = water.tile_of(to);
     water.tiles.touch(target);
-    super::soak::note_arrival(water, now, to);
-    if source != target && water.tiles.has(target, Tiles::POOL) {
+    super::soak::note_arrival(water, now, to, target);
+    if target != tile && water.tiles.has(target, Tiles::POOL) {
         water.tiles.run(target);
     }
-    wake_uphill(water, now, from, source);
+    wake_uphill(water, now, from, tile);
 }
 
 /// A texel that drains may let its neighbours' water in other tiles go.

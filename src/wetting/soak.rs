@@ -1,5 +1,6 @@
 //! Water that comes: drops are shared out among the texels under their stamps.
 
+use super::run_off::LEAST_RETAINED;
 use super::surface::{Now, SurfaceWater, Tiles};
 use crate::overlay::Splat;
 use crate::overlay::kernel::{axis_coverage, share};
@@ -39,8 +40,8 @@ pub(crate) fn soak(water: &mut SurfaceWater, now: &Now, drop: &Drop, scratch: &m
             }
             let under = y * size + x;
             let texel = now.geometry.stand_in(under).unwrap_or(home);
-            water.add(now, texel, water.units.from_nl(u64::from(nl)));
-            note_arrival(water, now, texel);
+            let tile = water.add(now, texel, water.units.from_nl(u64::from(nl)));
+            note_arrival(water, now, texel, tile);
         }
     }
     water.ledger.received += water.units.from_nl(u64::from(drop.water_nl));
@@ -54,12 +55,13 @@ fn hit_texel(now: &Now, drop: &Drop, size: u32) -> u32 {
     now.geometry.stand_in(under).unwrap_or(under)
 }
 
-/// What has got water may run and spread.
-pub(crate) fn note_arrival(water: &mut SurfaceWater, now: &Now, texel: u32) {
-    let tile = water.tile_of(texel);
-    let film_mm = f64::from(water.texels[texel as usize].film) * now.scale(water.units, texel).unit_mm;
-    if film_mm > f64::from(now.material.retained_mm) * super::run_off::LEAST_RETAINED {
-        water.tiles.run(tile);
+/// What has got water may run and spread. `tile`: of the texel.
+pub(crate) fn note_arrival(water: &mut SurfaceWater, now: &Now, texel: u32, tile: u32) {
+    if !water.tiles.has(tile, Tiles::RUNNING) {
+        let film_mm = f64::from(water.texels[texel as usize].film) * now.scale(water.units, texel).unit_mm;
+        if film_mm > f64::from(now.material.retained_mm) * LEAST_RETAINED {
+            water.tiles.run(tile);
+        }
     }
     if now.matter.capacity_mm > 0.0 && !water.tiles.has(tile, Tiles::SPREADING) {
         water.tiles.spread(tile);

@@ -95,17 +95,23 @@ fn collect_moves(
             continue;
         }
         let unit_mm = now.scale(water.units, texel).unit_mm;
+        // Nobody takes more than one who is quite dry and yet takes as fast as this one gives.
+        let fastest = diffusivity(sorptivity, pore_volume, own);
+        let distance = |side| f64::from(now.geometry.distance(texel, side)) * 1000.0;
+        let nearest = distance(Side::PlusU).min(distance(Side::PlusV));
+        if fastest * seconds / (nearest * nearest) * own * capacity < least {
+            continue;
+        }
         for side in Side::ALL {
             let Link::Texel(other) = now.geometry.link(texel, side) else { continue };
             let state = water.texels[other as usize];
             let theirs = now.amounts(&now.scale(water.units, other), other, &state).pores_mm / capacity;
             let difference = own - theirs;
-            if difference <= 0.0 {
+            if difference * capacity <= least {
                 continue;
             }
-            let between = 0.5
-                * (diffusivity(sorptivity, pore_volume, own) + diffusivity(sorptivity, pore_volume, theirs));
-            let distance_mm = f64::from(now.geometry.distance(texel, side)) * 1000.0;
+            let between = 0.5 * (fastest + diffusivity(sorptivity, pore_volume, theirs));
+            let distance_mm = distance(side);
             // A quarter of the difference at most: then four neighbours cannot turn it round.
             let part = (between * seconds / (distance_mm * distance_mm)).min(0.2);
             let mm = part * difference * capacity;

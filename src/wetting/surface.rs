@@ -47,6 +47,8 @@ pub struct Ledger {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Tiles {
     pub(crate) flags: Vec<u8>,
+    /// How often a tile with films that may run has doubled the time between its steps.
+    pub(crate) patience: Vec<u8>,
     /// Films that may run.
     pub(crate) running: Vec<u32>,
     /// Pores that may share what they hold.
@@ -198,7 +200,7 @@ impl SurfaceWater {
     pub fn bytes(&self) -> usize {
         self.texels.capacity() * size_of::<TexelWater>()
             + self.marks.capacity() * size_of::<Marks>()
-            + self.tiles.flags.capacity()
+            + 2 * self.tiles.flags.capacity()
     }
 
     /// Covers all of the surface with water, beside what it has: film and absorbed, mm. It has been there for so long that
@@ -232,6 +234,7 @@ impl SurfaceWater {
         if self.texels.is_empty() {
             self.texels = vec![TexelWater::default(); (self.size * self.size) as usize];
             self.tiles.flags = vec![0; (self.size / TILE_SIZE).pow(2) as usize];
+            self.tiles.patience = self.tiles.flags.clone();
         }
         if marks && self.marks.is_empty() {
             self.marks = vec![Marks::default(); self.texels.len()];
@@ -288,8 +291,8 @@ impl SurfaceWater {
         }
     }
 
-    /// Adds water to a texel, now. What does not fit is spilled.
-    pub(crate) fn add(&mut self, now: &Now, texel: u32, units: u64) {
+    /// Adds water to a texel, now; returns its tile. What does not fit is spilled.
+    pub(crate) fn add(&mut self, now: &Now, texel: u32, units: u64) -> u32 {
         self.settle(now, texel);
         let tile = self.tile_of(texel);
         let water = &mut self.texels[texel as usize];
@@ -298,6 +301,7 @@ impl SurfaceWater {
         water.film += added as u32;
         self.ledger.spilled += units - added;
         self.tiles.touch(tile);
+        tile
     }
 
     /// Film and absorbed water of all texels now, and what has evaporated by now; units.

@@ -103,18 +103,20 @@ impl Scale {
     /// in the film or, if there is none, counts as evaporated: nothing is lost.
     pub fn commit(&self, texel: &mut TexelWater, amounts: Amounts, look: WaterLook, tick: u32) -> u64 {
         let before = texel.total();
-        let units = |mm: f64| (mm / self.unit_mm).round().clamp(0.0, f64::from(u32::MAX)) as u64;
+        // Rounds, since it is not negative; saturates.
+        let units = |mm: f64| (mm.max(0.0) / self.unit_mm + 0.5) as u64;
         let pores = units(amounts.pores_mm).min(before);
         let gone = before as f64 * self.unit_mm - amounts.film_mm - amounts.pores_mm;
         let film = if amounts.film_mm > 0.0 { (before - pores).saturating_sub(units(gone)) } else { 0 };
         texel.film = u32::try_from(film).unwrap_or(u32::MAX);
         texel.pores = u32::try_from(pores).unwrap_or(u32::MAX);
         texel.tick = tick;
-        let byte = |part: f64| (part * 255.0).round().clamp(0.0, 255.0) as u8;
+        let byte = |part: f64| (part * 255.0 + 0.5) as u8;
         texel.shown = byte(look.wetness);
         texel.filmed = if film > 0 { byte(look.film) } else { 0 };
         let reserve = if self.reserve_mm > 0.0 { amounts.reserve_mm / self.reserve_mm } else { 0.0 };
-        texel.reserve = (reserve * 255.0).ceil().clamp(0.0, 255.0) as u8;
+        // Up, so that it does not last for ever less than it should.
+        texel.reserve = (reserve * 255.0 + 0.999_999) as u8;
         before - texel.total()
     }
 }

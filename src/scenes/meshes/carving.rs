@@ -1,7 +1,7 @@
 //! What is carved into a bas-relief, as a height over the plate.
 //!
 //! A moulded frame with a row of pearls, and in it a niche below a round arch: its head is a shell, before
-//! which the face of a sun hangs among its rays; below stands an acanthus between two scrolls. A sill
+//! which the face of a sun hangs among its rays; below stands a palmette between two scrolls. A sill
 //! carries the niche on dentils, and a rose fills each corner above the arch. Every shape is a distance to
 //! its outline, taken through the profile of a moulding; shapes are put over each other by taking the
 //! greater height, so the stone is never undercut.

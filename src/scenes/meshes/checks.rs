@@ -49,8 +49,18 @@ fn rounds() -> [(&'static str, Mesh, usize); 4] {
     ]
 }
 
+/// Bodies of several faces: name, mesh, triangles.
+fn bodies() -> [(&'static str, Mesh, usize); 3] {
+    let relief = bas_relief(Vec2::new(0.9, 1.2), 0.05, UVec2::new(96, 128), 1);
+    [
+        ("bas-relief", relief.expect("valid"), 29_952),
+        ("stair", stair(1.8, 5, 0.16, 0.32, 0.009, UVec2::new(96, 24), 1).expect("valid"), 43_678),
+        ("roof", roof(Vec2::new(2.4, 1.2), 30.0, UVec2::new(12, 4), 10).expect("valid"), 23_248),
+    ]
+}
+
 fn presets() -> impl Iterator<Item = (&'static str, Mesh, usize)> {
-    sheets().into_iter().chain(rounds())
+    sheets().into_iter().chain(rounds()).chain(bodies())
 }
 
 #[test]

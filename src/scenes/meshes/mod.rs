@@ -5,6 +5,9 @@
 //! | `flat` | [`ground`], [`road`] with basins for puddles in its vertex colours, [`cloth`] with folds |
 //! | `ball` | [`uv_sphere`], and [`rock`], a sphere that noise has dented |
 //! | `lathe` | [`vase`] and [`flowerpot`], turned from the splines of `profile` |
+//! | `relief` | [`bas_relief`], a plate with what `carving` designs |
+//! | `stair` | [`stair`], a flight of worn steps |
+//! | `roof` | [`roof`], a slope of tiles |
 //!
 //! Every mesh is an indexed triangle list with positions, unit normals, UVs and tangents, wound
 //! counter-clockwise as seen from outside. A closed surface is cut open along one meridian: the vertices of
@@ -14,15 +17,23 @@
 //! What noise shapes takes a seed, and is the same on every run.
 
 mod ball;
+mod carving;
 #[cfg(test)]
 mod checks;
 mod flat;
+mod grid;
 mod lathe;
 mod profile;
+mod relief;
+mod roof;
+mod stair;
 
 pub use ball::{rock, uv_sphere};
 pub use flat::{cloth, ground, road};
 pub use lathe::{flowerpot, vase};
+pub use relief::bas_relief;
+pub use roof::roof;
+pub use stair::stair;
 
 use std::f32::consts::TAU;
 

@@ -9,7 +9,7 @@ use super::{MeshError, Surface, at_least, positive};
 
 /// Quads from the front to the back of the plate.
 const ACROSS_THE_EDGE: u32 = 6;
-/// The steepest the stone stands, as a slope of the front: 62 degrees. A grid cannot shade what is steeper.
+/// The steepest the stone stands, as a slope of the front: 58 degrees. A grid cannot shade what is steeper.
 const STEEPEST: f32 = 1.6;
 /// Slope of the upper side: 4 degrees.
 const FALL: f32 = 0.07;
@@ -17,12 +17,12 @@ const FALL: f32 = 0.07;
 /// An upright stone plate that faces +z, its lower edge at `y = 0` and its back at `z = 0`, with a
 /// bas-relief.
 ///
-/// A moulded frame, and in it a niche with a shell, the face of a sun and an acanthus; each `seed` has
-/// other marks of the chisel and other wear. `size` is the extent along x and y in metres, centred on `x =
-/// 0`. The carving fills a plate of 3 to 4; in others it stands in the middle. `depth` is how far the face
-/// lies above the deepest hollow, in metres; a twentieth of the width looks right. The plate is as thick
-/// again behind that hollow: it reaches to `z = 2 * depth`. Its upper side falls 4 degrees to the front, so
-/// rain that lies there runs down over the carving. There is no back: it stands against a wall.
+/// A moulded frame, and in it a niche with a shell, the face of a sun and a palmette; each `seed` has other
+/// marks of the chisel and other wear. `size` is the extent in metres along x, with 0 in the middle, and
+/// along y. The carving fills a plate of 3 to 4; in others it stands in the middle. `depth` is how far the
+/// face lies above the deepest hollow, in metres; a twentieth of the width looks right. The plate is as
+/// thick again behind that hollow: it reaches to `z = 2 * depth`. Its upper side falls 4 degrees to the
+/// front, so rain that lies there runs down over the carving. There is no back: it stands against a wall.
 ///
 /// `cells` is the number of quads along x and y over the front, and 192 by 256 show the carving. The mesh
 /// has `2 * (cells.x * cells.y + 12 * (cells.x + cells.y))` triangles.

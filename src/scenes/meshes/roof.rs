@@ -37,8 +37,8 @@ const UNDERSIDE: f32 = 0.25;
 /// next one. The roof is 4 centimetres thick below its channels, its eave plumb with a narrow level strip
 /// below it, and it is closed all around.
 ///
-/// `cells` is the number of quads across a tile and along it, at least 4. With `rows`, which is `tiles.y *
-/// (cells + 1) - 1`, the mesh has `4 * tiles.x * cells * (rows + 4) + 16 * rows` triangles.
+/// `cells` is the number of quads across a tile and along it, at least 4. With `rows`, which is
+/// `tiles.y * (cells + 1) - 1`, the mesh has `4 * tiles.x * cells * (rows + 4) + 16 * rows` triangles.
 ///
 /// The uvs of ridge, upper side, eave and lower side are one sheet, in this order: `u` grows with x, `v` on
 /// the way down, so that water runs over the eave without meeting a seam. The lower side has a quarter of

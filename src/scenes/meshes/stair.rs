@@ -1,6 +1,6 @@
 //! A flight of stone steps that many feet have hollowed.
 
-use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use bevy::math::{UVec2, Vec2, Vec3};
 use bevy::mesh::Mesh;
@@ -20,7 +20,7 @@ const CORNER: f32 = 0.02;
 const OVERHANG: f32 = 0.12;
 const ROUNDING: f32 = 0.08;
 /// Slope of the treads towards the front.
-const FALL: f32 = 0.008;
+const FALL: f32 = 0.012;
 /// Depth of the wear at the nose, over that of the hollow behind it.
 const LIP: f32 = 0.35;
 /// How much of the sides' map there is to a metre, over that of the steps: nobody looks at them closely.
@@ -29,14 +29,15 @@ const SIDES: f32 = 0.5;
 /// A straight flight of steps that climbs towards -z and faces +z; its foot is at `y = 0` and `z = 0`.
 ///
 /// `width`, `rise` and `going`, the depth of a tread, are in metres; the flight is centred on `x = 0`.
-/// Noses are round and stand out by about an eighth of the rise. In the middle of its tread each step is
-/// hollowed by up to `hollow` metres, 0.006 to 0.01 as a rule, and worn a third as deep at its nose: water
-/// gathers in the hollow, and what is too much for it runs over the middle of the nose. Where and how deep
-/// the hollow is, `seed` says. The flight is closed at both sides, where the steps are not worn, and open
-/// behind and below.
+/// Treads fall a little over 1 % to the front; noses are round and stand out by about an eighth of the rise.
+/// In the middle of its tread each step is hollowed by up to `hollow` metres, 0.006 to 0.01 as a rule, and
+/// worn a third as deep at its nose: water gathers in the hollow, and what is too much for it runs over the
+/// middle of the nose. Where and how deep the hollow is, `seed` says. The flight is closed at both sides,
+/// where the steps are not worn, and open behind and below.
 ///
-/// `cells` is the number of quads across the width and along a tread. With `rows`, which is `cells.y +
-/// cells.y.div_ceil(2) + 9`, the mesh has `2 * steps * (cells.x * rows + rows + 3) - 2` triangles.
+/// `cells` is the number of quads across the width and along a tread. With `rows`, which is
+/// `cells.y + cells.y.div_ceil(2) + 9`, the mesh has
+/// `2 * steps * (cells.x * rows + rows + 3) - 2` triangles.
 ///
 /// The uvs of treads and risers are one sheet, unfolded along the flight: `u` grows with x, `v` on the way
 /// down. To the right of it lie the sides, the one at +x above the other, with a gutter in between; along
@@ -143,8 +144,7 @@ impl Flight {
             }
             for cell in 0..=cells {
                 let part = cell as f32 / cells as f32;
-                let wear =
-                    Vec2::new((part * 2.0 * FRAC_PI_2).sin().powi(2), part * part * (3.0 - 2.0 * part));
+                let wear = Vec2::new((part * PI).sin().powi(2), part * part * (3.0 - 2.0 * part));
                 push(corner - self.going + part * deep, self.rise + fall * (1.0 - part), wear);
             }
             let last = FRAC_PI_2 + FRAC_PI_4;
