@@ -61,6 +61,11 @@ impl WeatheringClock {
         self.tick = 0;
     }
 
+    /// To a tick that was reached in another run.
+    pub(crate) fn go_to(&mut self, tick: u32) {
+        self.tick = tick;
+    }
+
     /// One tick on.
     pub fn advance(&mut self) {
         self.tick += 1;

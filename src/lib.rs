@@ -10,6 +10,7 @@ pub mod output;
 pub mod overlay;
 pub mod particle;
 pub mod replay;
+pub mod save;
 pub mod scenario;
 pub mod scenes;
 pub mod schedule;

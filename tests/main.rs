@@ -29,11 +29,15 @@ mod gpu {
     mod twins;
     /// Shaders that change.
     mod understudy;
+    /// Water as it is drawn.
+    mod water;
 }
 /// Structs that Rust and WGSL share.
 mod layout;
 /// The program as its users run it: output, errors, exit codes.
 mod replay;
+/// Scenes that are saved and gone on with, and accounts of all water.
+mod save;
 /// What the parts are together: order, independence of a renderer.
 mod schedule;
 /// The smaller tools of the program.

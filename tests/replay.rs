@@ -42,25 +42,25 @@ const MESH: &str = "Ground(size: (1.0, 1.0), cells: (2, 2))";
 const EFFECT: &str = "\"effects/tap.effect.ron\"";
 
 /// How a run of the program ended.
-struct Outcome {
-    code: Option<i32>,
-    stdout: String,
-    stderr: String,
+pub struct Outcome {
+    pub code: Option<i32>,
+    pub stdout: String,
+    pub stderr: String,
 }
 
 impl Outcome {
     /// The report of a run that went well and had no `--out`.
-    fn report(&self) -> Value {
+    pub fn report(&self) -> Value {
         self.assert_success();
         serde_json::from_str(&self.stdout).expect("standard output is the report")
     }
 
-    fn assert_success(&self) {
+    pub fn assert_success(&self) {
         assert_eq!(self.code, Some(0), "{}", self.stderr);
     }
 
     /// The run was refused with a message that has all of `named`, before anything was written.
-    fn assert_refused(&self, named: &[&str], out: &Path) {
+    pub fn assert_refused(&self, named: &[&str], out: &Path) {
         assert_eq!(self.code, Some(2), "{named:?}: {}", self.stderr);
         for name in named {
             assert!(self.stderr.contains(name), "no {name:?} in: {}", self.stderr);
@@ -71,13 +71,13 @@ impl Outcome {
 }
 
 /// `weathering replay FILE OPTIONS...`.
-fn replay(file: impl AsRef<OsStr>, options: &str) -> Command {
+pub fn replay(file: impl AsRef<OsStr>, options: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_weathering"));
     command.current_dir(env!("CARGO_MANIFEST_DIR")).arg("replay").arg(file).args(options.split_whitespace());
     command
 }
 
-fn run(command: &mut Command) -> Outcome {
+pub fn run(command: &mut Command) -> Outcome {
     let output = command.output().expect("the program starts");
     Outcome {
         code: output.status.code(),
@@ -93,16 +93,16 @@ fn without_timing(mut report: Value) -> Value {
     report
 }
 
-fn read_report(out: &Path) -> Value {
+pub fn read_report(out: &Path) -> Value {
     let bytes = fs::read(out.join("report.json")).expect("there is a report");
     serde_json::from_slice(&bytes).expect("the report is JSON")
 }
 
-fn number(value: &Value) -> f64 {
+pub fn number(value: &Value) -> f64 {
     value.as_f64().expect("a number")
 }
 
-fn surfaces(report: &Value) -> &[Value] {
+pub fn surfaces(report: &Value) -> &[Value] {
     report["surfaces"].as_array().expect("a list of surfaces")
 }
 
@@ -112,7 +112,7 @@ fn triangle_counts(report: &Value) -> Vec<(&str, u64)> {
 }
 
 /// All files below a folder, hidden ones too.
-fn files_below(folder: &Path) -> BTreeSet<String> {
+pub fn files_below(folder: &Path) -> BTreeSet<String> {
     let mut files = BTreeSet::new();
     let mut folders = vec![folder.to_owned()];
     while let Some(next) = folders.pop() {
@@ -146,7 +146,7 @@ fn grey_map(out: &Path, name: &str) -> Vec<u16> {
 
 /// A scenario's folders in a temporary place, with good and bad files, and beside them a folder that no
 /// scenario may read.
-struct Tree(TempDir);
+pub struct Tree(TempDir);
 
 impl Tree {
     fn new() -> Self {

@@ -2,6 +2,7 @@
 
 use bevy::prelude::*;
 use rand_pcg::Pcg32;
+use serde::{Deserialize, Serialize};
 
 use super::{EmissionSeed, Emitter};
 use crate::clock::WeatheringClock;
@@ -12,7 +13,7 @@ use crate::particle::{
 };
 
 /// What an [`Emitter`] has sent out and still owes.
-#[derive(Component, Debug, Clone, Default)]
+#[derive(Component, Serialize, Deserialize, Debug, Clone, Default, PartialEq)]
 pub struct EmitterState {
     /// Particles owed, times the tick rate: stays exact in `f64` for any `f32` rate.
     owed: f64,
@@ -57,6 +58,22 @@ impl NewParticles {
     pub fn restart(&mut self) {
         self.particles.clear();
         self.next_sequence = 0;
+    }
+
+    /// The number of the next particle.
+    pub(crate) fn next_sequence(&self) -> u32 {
+        self.next_sequence
+    }
+
+    /// Those that wait to be spawned.
+    pub(crate) fn waiting(&self) -> &[ParticleBundle] {
+        &self.particles
+    }
+
+    /// As they were when the run was saved.
+    pub(crate) fn restore(&mut self, waiting: Vec<ParticleBundle>, next_sequence: u32) {
+        self.particles = waiting;
+        self.next_sequence = next_sequence;
     }
 
     /// Water of those that wait to be spawned, nanolitres.

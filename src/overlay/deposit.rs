@@ -1,6 +1,7 @@
 //! Impacts become splats on the surfaces they hit.
 
 use bevy::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::splat::pack_unorm;
 use super::{Splat, TexelAreas, Weatherable};
@@ -20,7 +21,7 @@ pub struct SplatQueue {
 }
 
 /// What has ever come to a surface. What has not come need not be looked for when it is drawn.
-#[derive(Component, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[derive(Component, Reflect, Serialize, Deserialize, Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[reflect(Component)]
 pub struct SurfaceTraces {
     /// Water.
@@ -41,6 +42,11 @@ impl SplatQueue {
         self.splats.push(splat);
     }
 
+    /// As they were when the surface was saved.
+    pub(crate) fn restore_traces(&mut self, traces: SurfaceTraces) {
+        self.traces = traces;
+    }
+
     /// Whether nothing waits.
     pub fn is_empty(&self) -> bool {
         self.splats.is_empty()
@@ -58,7 +64,7 @@ impl SplatQueue {
 }
 
 /// What a surface has received.
-#[derive(Component, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[derive(Component, Reflect, Serialize, Deserialize, Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[reflect(Component)]
 pub struct SurfaceTotals {
     /// Particles that hit it.

@@ -19,6 +19,7 @@ mod integrate;
 mod retire;
 
 use bevy::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::effect::EffectIndex;
 use crate::schedule::{RetireParticles, WeatheringSystems, WeatheringTick};
@@ -56,6 +57,47 @@ pub struct Sequence(pub u32);
 
 /// Everything a particle is.
 pub type ParticleBundle = (Position, Velocity, Lifespan, Volume, Sequence, EffectIndex);
+
+/// A particle in a file. Floats as their bits, so that nothing depends on how they are written.
+#[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct SavedParticle {
+    position: [u32; 3],
+    velocity: [u32; 3],
+    ticks_left: u16,
+    born_at: u16,
+    volume_nl: u32,
+    pub(crate) sequence: u32,
+    effect: u16,
+}
+
+impl From<ParticleBundle> for SavedParticle {
+    fn from((position, velocity, lifespan, volume, sequence, effect): ParticleBundle) -> Self {
+        let bits = |vector: Vec3| vector.to_array().map(f32::to_bits);
+        Self {
+            position: bits(position.0),
+            velocity: bits(velocity.0),
+            ticks_left: lifespan.ticks_left,
+            born_at: lifespan.born_at,
+            volume_nl: volume.0,
+            sequence: sequence.0,
+            effect: effect.0,
+        }
+    }
+}
+
+impl From<SavedParticle> for ParticleBundle {
+    fn from(saved: SavedParticle) -> Self {
+        let vector = |bits: [u32; 3]| Vec3::from_array(bits.map(f32::from_bits));
+        (
+            Position(vector(saved.position)),
+            Velocity(vector(saved.velocity)),
+            Lifespan { ticks_left: saved.ticks_left, born_at: saved.born_at },
+            Volume(saved.volume_nl),
+            Sequence(saved.sequence),
+            EffectIndex(saved.effect),
+        )
+    }
+}
 
 /// Bytes of component data per particle.
 pub const BYTES_PER_PARTICLE: usize = size_of::<Position>()
@@ -112,7 +154,7 @@ impl Default for Forces {
 }
 
 /// What has happened to all particles so far. `emitted == alive + hit + expired` after every tick.
-#[derive(Resource, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[derive(Resource, Reflect, Serialize, Deserialize, Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[reflect(Resource)]
 pub struct ParticleCounts {
     /// Particles spawned.
@@ -129,7 +171,7 @@ pub struct ParticleCounts {
 
 /// The water of all particles so far, nanolitres. `emitted` and what surfaces dripped is what they received, what expired,
 /// and what is still in flight.
-#[derive(Resource, Debug, Default, Clone, PartialEq, Eq)]
+#[derive(Resource, Serialize, Deserialize, Debug, Default, Clone, PartialEq, Eq)]
 pub struct WaterCounts {
     /// Sent out by emitters.
     pub emitted_nl: u64,

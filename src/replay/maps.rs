@@ -113,7 +113,7 @@ impl Run<'_> {
             let world = self.app.world_mut();
             let mut totals = world.query::<&SurfaceTotals>();
             let impacts: u64 = totals.iter(world).map(|totals| totals.impacts).sum();
-            if world.resource::<SplatStats>().splats() >= impacts {
+            if world.resource::<SplatStats>().splats() + self.painted_before >= impacts {
                 // The frame that painted them is done: `step` waits for the GPU.
                 return Ok(());
             }

@@ -12,13 +12,16 @@ mod files;
 mod maps;
 mod report;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 
 use crate::clock::WeatheringClock;
+use crate::emitter::EmissionSeed;
+use crate::overlay::SurfaceTotals;
+use crate::save::{ColorMaps, SaveError, SavedScene};
 use crate::scenario::{LoadedScenario, ScenarioError, ScenarioPlugin, ScenarioStatus};
 
 pub use app::{require_adapter, task_pools};
@@ -46,6 +49,10 @@ pub struct ReplayOptions {
     pub threads: Option<usize>,
     /// Draw pictures.
     pub render: bool,
+    /// A [saved scene](crate::save) to go on from.
+    pub resume: Option<PathBuf>,
+    /// Folder to save the scene into at the end.
+    pub save: Option<PathBuf>,
 }
 
 impl ReplayOptions {
@@ -63,6 +70,8 @@ impl ReplayOptions {
             seed: None,
             threads: None,
             render: true,
+            resume: None,
+            save: None,
         }
     }
 }
@@ -114,6 +123,9 @@ pub enum ReplayError {
         /// How long it was waited for.
         seconds: u64,
     },
+    /// The scene could not be saved or restored.
+    #[error(transparent)]
+    Save(#[from] SaveError),
     /// The report could not be written as JSON.
     #[error("cannot write the report: {0}")]
     Report(#[from] serde_json::Error),
@@ -138,7 +150,13 @@ const PATIENCE_SECONDS: u64 = 300;
 pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Result<Report, ReplayError> {
     let begun = Instant::now();
     options.check()?;
-    let mut run = Run::load(options)?;
+    let saved = options.resume.as_deref().map(SavedScene::read).transpose()?;
+    let file = std::fs::read(&options.scenario.file)
+        .map_err(|source| ScenarioError::Read { file: options.scenario.file.clone(), source })?;
+    let mut run = Run::load(options, saved.as_ref().map(SavedScene::seed))?;
+    if let (Some(saved), Some(folder)) = (&saved, &options.resume) {
+        run.resume(saved, &file, folder)?;
+    }
     if let Some(out) = &options.out {
         files::require_writable(out)?;
         files::remove_earlier_run(out)?;
@@ -153,9 +171,13 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
     } else {
         0
     };
-    let mut tick = 0;
+    let mut tick = clock.tick().min(ticks);
     for frame in 0..frames {
         let due = (u64::from(frame) * u64::from(clock.hz()) / u64::from(options.fps)) as u32;
+        if due < tick {
+            // Drawn before it was saved.
+            continue;
+        }
         run.capture(frame)?;
         run.step(due - tick)?;
         tick = due;
@@ -178,6 +200,15 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
         total_seconds: begun.elapsed().as_secs_f64(),
         frames,
     };
+    if let Some(folder) = &options.save {
+        let seed = run.app.world().resource::<EmissionSeed>().0;
+        let colors = maps.iter().map(|maps| ColorMaps {
+            diffuse: maps.diffuse.clone(),
+            specular: maps.specular.clone(),
+            normal: maps.normal.clone(),
+        });
+        SavedScene::capture(run.app.world_mut(), &file, seed, colors.collect()).write(folder)?;
+    }
     let report = report::report(run.app.world_mut(), options, &maps, timing);
     if let Some(out) = &options.out {
         maps::write_maps(&out.join("maps"), &maps)?;
@@ -215,19 +246,21 @@ struct Run<'a> {
     options: &'a ReplayOptions,
     app: App,
     target: Option<Handle<Image>>,
+    /// Impacts whose splats were painted before the scene was saved.
+    painted_before: u64,
 }
 
 impl<'a> Run<'a> {
     /// Builds the app and waits until the scene is there.
-    fn load(options: &'a ReplayOptions) -> Result<Self, ReplayError> {
+    fn load(options: &'a ReplayOptions, saved_seed: Option<u64>) -> Result<Self, ReplayError> {
         if options.render {
             require_adapter()?;
         }
         let mut scenario = ScenarioPlugin::new(options.scenario.clone(), options.render)?;
-        scenario.seed = options.seed;
+        scenario.seed = saved_seed.or(options.seed);
         let mut app = app::build(options, scenario);
         let target = options.render.then(|| capture::add_target(app.world_mut(), options.size));
-        let mut run = Self { options, app, target };
+        let mut run = Self { options, app, target, painted_before: 0 };
         let begun = Instant::now();
         loop {
             run.step(0)?;
@@ -249,6 +282,17 @@ impl<'a> Run<'a> {
             run.step(0)?;
         }
         Ok(run)
+    }
+
+    /// Puts a saved scene in place of the fresh one.
+    fn resume(&mut self, saved: &SavedScene, file: &[u8], folder: &Path) -> Result<(), ReplayError> {
+        saved.restore(self.app.world_mut(), file, folder)?;
+        let world = self.app.world_mut();
+        self.painted_before = world.query::<&SurfaceTotals>().iter(world).map(|totals| totals.impacts).sum();
+        for _ in 0..3 {
+            self.step(0)?;
+        }
+        Ok(())
     }
 
     /// One frame that holds `ticks` ticks.

@@ -1,7 +1,9 @@
 //! What evaporates.
 
+use serde::{Deserialize, Serialize};
+
 /// An amount of water that could evaporate, mm, or a rate of it.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Default)]
 pub struct Demand {
     /// By the air, from a free surface.
     pub air_mm: f64,

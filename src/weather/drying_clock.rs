@@ -1,6 +1,7 @@
 //! The integral of what evaporates, one number for all texels.
 
 use bevy::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::{Demand, Weather};
 use crate::clock::WeatheringClock;
@@ -18,7 +19,7 @@ pub struct DryingClock {
 }
 
 /// From a tick on, a constant rate.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Default)]
 pub struct DryingPoint {
     /// When.
     pub tick: u32,

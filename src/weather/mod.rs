@@ -13,6 +13,7 @@ mod demand;
 mod drying_clock;
 
 use bevy::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::schedule::{WeatheringSystems, WeatheringTick};
 
@@ -20,7 +21,7 @@ pub use demand::{Demand, evaporation_mm_per_h, humidity_ratio, sun_mm_per_h};
 pub use drying_clock::{DryingClock, DryingPoint, advance_drying_clock};
 
 /// How the weather is, everywhere. May be changed at any time; what has dried until then stays dry.
-#[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq)]
+#[derive(Resource, Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
 #[reflect(Resource)]
 pub struct Weather {
     /// °C, -40..=60. Below 0 nothing evaporates here.

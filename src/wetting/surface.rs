@@ -1,6 +1,7 @@
 //! The water of one surface: its texels, which tiles of them are busy, and what has become of it.
 
 use bevy::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::evolve::{Amounts, Matter, evolve};
 use super::look::{WaterLook, water_look};
@@ -30,7 +31,7 @@ pub struct SurfaceWater {
 }
 
 /// What has become of the water of a surface; units.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Ledger {
     /// Came with particles.
     pub received: u64,
@@ -159,6 +160,44 @@ impl SurfaceWater {
             rained_at: 0,
             generation: 0,
         }
+    }
+
+    /// As it was saved. `tiles`: flags and patience of each.
+    pub(crate) fn from_saved(
+        size: u32,
+        shift: u32,
+        texels: Vec<TexelWater>,
+        marks: Vec<Marks>,
+        tiles: &[(u8, u8)],
+        ledger: Ledger,
+        rained_at: u32,
+    ) -> Self {
+        let mut water = Self::new(&Weatherable { map_size: size, ..default() }, 1.0);
+        water.units = Units { shift: shift.min(Units::MAX_SHIFT) };
+        (water.texels, water.marks, water.ledger, water.rained_at) = (texels, marks, ledger, rained_at);
+        water.tiles.flags = vec![0; tiles.len()];
+        water.tiles.patience = tiles.iter().map(|&(_, patience)| patience.min(7)).collect();
+        for (tile, &(flags, _)) in tiles.iter().enumerate() {
+            let tile = tile as u32;
+            let set = |flag: u8| flags & flag != 0;
+            if set(Tiles::RUNNING) {
+                water.tiles.run(tile);
+            }
+            if set(Tiles::SPREADING) {
+                water.tiles.spread(tile);
+            }
+            if set(Tiles::WET) {
+                water.tiles.touch(tile);
+            }
+            water.tiles.flags[tile as usize] |= flags & Tiles::POOL;
+        }
+        water
+    }
+
+    /// Flags and patience of each tile, but for what is only about drawing.
+    pub(crate) fn tile_states(&self) -> impl Iterator<Item = (u8, u8)> {
+        let flags = self.tiles.flags.iter().map(|flags| flags & !Tiles::DIRTY);
+        flags.zip(self.tiles.patience.iter().copied())
     }
 
     /// Texels along each side.

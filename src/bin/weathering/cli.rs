@@ -49,6 +49,12 @@ pub struct ReplayArgs {
     /// Threads to compute with [default: all cores]
     #[arg(long)]
     pub threads: Option<usize>,
+    /// Go on from a folder written by --save-state
+    #[arg(long)]
+    pub resume: Option<PathBuf>,
+    /// Folder to save the scene into at the end, to go on from
+    #[arg(long)]
+    pub save_state: Option<PathBuf>,
     /// Simulate only; needs no graphics driver, and gives the same digest
     #[arg(long)]
     pub no_render: bool,

@@ -19,6 +19,8 @@ pub fn run(arguments: &ReplayArgs) -> Result<(), Box<dyn Error>> {
         seed: arguments.seed,
         threads: arguments.threads,
         render: !arguments.no_render,
+        resume: arguments.resume.clone(),
+        save: arguments.save_state.clone(),
         ..ReplayOptions::new(Scenario::load(&arguments.file)?)
     };
     let bar = ProgressBar::no_length().with_style(

@@ -1,0 +1,202 @@
+//! Keeping a scene: all its maps, and all else that its future depends on, in one folder.
+//!
+//! [`SavedScene::capture`] takes what a running scenario holds, [`SavedScene::write`] puts it into a folder that is there
+//! whole or not at all, and a run that [restores](SavedScene::restore) it goes on to the same digest as one that was never
+//! interrupted.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `state.ron` | version, time, weather, emitters, particles in flight, accounts |
+//! | `<surface>_film.png`, `_pores.png`, `_since.png` | a texel's words, the lowest byte in red, the highest in alpha |
+//! | `<surface>_look.png` | how wet it looked, reserve, how much of its film was seen |
+//! | `<surface>_efflorescence.png`, `_tide.png` | bits of `f32`, as above; if the material leaves marks |
+//! | `<surface>_tiles.png` | flags and patience of its tiles |
+//! | `<surface>_diffuse.png`, `_specular.png`, `_normal.png` | colour maps, premultiplied |
+//!
+//! Not kept: rings of drops, which live for less than a second.
+
+mod error;
+mod maps;
+mod restore;
+
+use std::path::Path;
+
+use bevy::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::clock::WeatheringClock;
+use crate::effect::EffectIndex;
+use crate::emitter::{Emitter, EmitterState, NewParticles};
+use crate::overlay::{SurfaceTotals, SurfaceTraces};
+use crate::particle::{
+    Lifespan, ParticleCounts, Position, SavedParticle, Sequence, Velocity, Volume, WaterCounts,
+};
+use crate::scenario::{Digest, ScenarioSurface};
+use crate::weather::{DryingClock, DryingPoint, Weather};
+use crate::wetting::{Ledger, SurfaceWater};
+
+pub use error::SaveError;
+pub use maps::ColorMaps;
+
+/// The version that is written. Others are refused.
+pub const VERSION: u32 = 1;
+
+/// A scene at a moment between two ticks.
+#[derive(Debug, Clone)]
+pub struct SavedScene {
+    pub(super) state: SceneState,
+    /// In the order of the scenario.
+    pub(super) surfaces: Vec<SavedSurface>,
+}
+
+/// What `state.ron` says.
+#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SceneState {
+    pub(super) version: u32,
+    /// Hash of the scenario's file.
+    pub(super) scenario: String,
+    pub(super) seed: u64,
+    pub(super) tick: u32,
+    pub(super) hz: u32,
+    /// Of the impacts so far.
+    pub(super) digest: [u8; 32],
+    pub(super) weather: Weather,
+    pub(super) drying: Vec<DryingPoint>,
+    pub(super) counts: ParticleCounts,
+    pub(super) water: WaterCounts,
+    pub(super) next_sequence: u32,
+    /// In the order of their streams.
+    pub(super) emitters: Vec<EmitterState>,
+    /// In flight, in the order of their numbers.
+    pub(super) particles: Vec<SavedParticle>,
+    /// To be born in the next tick.
+    pub(super) waiting: Vec<SavedParticle>,
+    pub(super) surfaces: Vec<SurfaceState>,
+}
+
+/// What `state.ron` says of a surface.
+#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SurfaceState {
+    pub(super) name: String,
+    /// Texels along each side.
+    pub(super) size: u32,
+    /// Units to a nanolitre, as a power of two.
+    pub(super) shift: u32,
+    /// It has been wet: there are maps of its water.
+    pub(super) wet: bool,
+    /// There are maps of its marks.
+    pub(super) marks: bool,
+    pub(super) ledger: Ledger,
+    pub(super) rained_at: u32,
+    pub(super) totals: SurfaceTotals,
+    pub(super) traces: SurfaceTraces,
+}
+
+/// The maps of a surface.
+#[derive(Debug, Clone)]
+pub(super) struct SavedSurface {
+    pub(super) water: SurfaceWater,
+    pub(super) colors: ColorMaps,
+}
+
+/// A scenario's emitters, in the order of their streams.
+pub(super) fn emitters_in_order(world: &mut World) -> Vec<Entity> {
+    let mut emitters = world.query::<(Entity, &Emitter)>();
+    let mut order: Vec<_> = emitters.iter(world).map(|(entity, emitter)| (emitter.stream, entity)).collect();
+    order.sort_unstable();
+    order.into_iter().map(|(_, entity)| entity).collect()
+}
+
+/// A scenario's surfaces, in its order.
+pub(super) fn surfaces_in_order(world: &mut World) -> Vec<(Entity, String)> {
+    let mut surfaces = world.query::<(Entity, &ScenarioSurface)>();
+    let mut order: Vec<_> =
+        surfaces.iter(world).map(|(entity, surface)| (surface.index, entity, surface.name.clone())).collect();
+    order.sort_unstable_by_key(|(index, ..)| *index);
+    order.into_iter().map(|(_, entity, name)| (entity, name)).collect()
+}
+
+impl SavedScene {
+    /// Takes the state of a scenario. `scenario`: its file, as it was read; `colors`: the colour maps of its surfaces, in
+    /// its order.
+    pub fn capture(world: &mut World, scenario: &[u8], seed: u64, colors: Vec<ColorMaps>) -> Self {
+        let mut flying = world.query::<(&Position, &Velocity, &Lifespan, &Volume, &Sequence, &EffectIndex)>();
+        let mut particles: Vec<SavedParticle> = flying
+            .iter(world)
+            .map(|(&position, &velocity, &lifespan, &volume, &sequence, &effect)| {
+                (position, velocity, lifespan, volume, sequence, effect).into()
+            })
+            .collect();
+        particles.sort_unstable_by_key(|particle| particle.sequence);
+        let emitters = emitters_in_order(world)
+            .into_iter()
+            .filter_map(|entity| world.get::<EmitterState>(entity).cloned())
+            .collect();
+        let order = surfaces_in_order(world);
+        let (mut states, mut surfaces) = (Vec::new(), Vec::new());
+        for ((entity, name), colors) in order.into_iter().zip(colors) {
+            let Some(water) = world.get::<SurfaceWater>(entity) else { continue };
+            let of = |entity: Entity| world.get::<SurfaceTotals>(entity).copied().unwrap_or_default();
+            states.push(SurfaceState {
+                name,
+                size: water.size(),
+                shift: water.units().shift,
+                wet: water.is_wet(),
+                marks: !water.marks().is_empty(),
+                ledger: water.ledger(),
+                rained_at: water.rained_at,
+                totals: of(entity),
+                traces: world.get::<SurfaceTraces>(entity).copied().unwrap_or_default(),
+            });
+            surfaces.push(SavedSurface { water: water.clone(), colors });
+        }
+        let clock = *world.resource::<WeatheringClock>();
+        let new = world.resource::<NewParticles>();
+        let state = SceneState {
+            version: VERSION,
+            scenario: blake3::hash(scenario).to_hex().to_string(),
+            seed,
+            tick: clock.tick(),
+            hz: clock.hz(),
+            digest: world.resource::<Digest>().0,
+            weather: *world.resource::<Weather>(),
+            drying: world.resource::<DryingClock>().points().to_vec(),
+            counts: *world.resource::<ParticleCounts>(),
+            water: world.resource::<WaterCounts>().clone(),
+            next_sequence: new.next_sequence(),
+            emitters,
+            particles,
+            waiting: new.waiting().iter().copied().map(SavedParticle::from).collect(),
+            surfaces: states,
+        };
+        Self { state, surfaces }
+    }
+
+    /// Writes the folder, in place of one that was saved there before. On an error that one is still there.
+    ///
+    /// # Errors
+    /// [`SaveError`] with the file.
+    pub fn write(&self, folder: &Path) -> Result<(), SaveError> {
+        maps::write(self, folder)
+    }
+
+    /// Reads a folder.
+    ///
+    /// # Errors
+    /// [`SaveError`] with file and field, also for maps that do not fit the state.
+    pub fn read(folder: &Path) -> Result<Self, SaveError> {
+        maps::read(folder)
+    }
+
+    /// Ticks that had run.
+    pub fn tick(&self) -> u32 {
+        self.state.tick
+    }
+
+    /// The seed of the run.
+    pub fn seed(&self) -> u64 {
+        self.state.seed
+    }
+}

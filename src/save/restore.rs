@@ -1,0 +1,126 @@
+//! Putting a saved scene into a world in which its scenario has been loaded.
+
+use std::path::Path;
+
+use bevy::asset::RenderAssetUsages;
+use bevy::prelude::*;
+
+use super::maps::value;
+use super::{SaveError, SavedScene, emitters_in_order, surfaces_in_order};
+use crate::clock::WeatheringClock;
+use crate::emitter::{EmitterState, NewParticles};
+use crate::overlay::{CpuMaps, Overlays, SurfaceTotals, SurfaceTraces, Weatherable};
+use crate::particle::ParticleBundle;
+use crate::scenario::Digest;
+use crate::weather::DryingClock;
+use crate::wetting::SurfaceWater;
+
+impl SavedScene {
+    /// Puts the state into a world whose scenario, `scenario` as it was read, is ready and has run no tick. `folder` is for
+    /// messages.
+    ///
+    /// # Errors
+    /// [`SaveError::Value`] if it was saved from another scenario; then the world is as it was.
+    pub fn restore(&self, world: &mut World, scenario: &[u8], folder: &Path) -> Result<(), SaveError> {
+        let (state, path) = (&self.state, folder.join("state.ron"));
+        let hash = blake3::hash(scenario).to_hex().to_string();
+        if state.scenario != hash {
+            return Err(value(
+                &path,
+                "scenario",
+                &state.scenario,
+                format!("{hash}, the hash of this scenario"),
+            ));
+        }
+        let emitters = emitters_in_order(world);
+        if emitters.len() != state.emitters.len() {
+            return Err(value(
+                &path,
+                "emitters",
+                state.emitters.len(),
+                format!("{} of them", emitters.len()),
+            ));
+        }
+        let surfaces = surfaces_in_order(world);
+        let names: Vec<&str> = surfaces.iter().map(|(_, name)| name.as_str()).collect();
+        let saved: Vec<&str> = state.surfaces.iter().map(|surface| surface.name.as_str()).collect();
+        if names != saved {
+            return Err(value(&path, "surfaces", format!("{saved:?}"), format!("{names:?}")));
+        }
+        for ((entity, name), surface) in surfaces.iter().zip(&state.surfaces) {
+            let size = world.get::<SurfaceWater>(*entity).map_or(0, SurfaceWater::size);
+            if size != surface.size {
+                return Err(value(&path, &format!("size of {name}"), surface.size, size.to_string()));
+            }
+        }
+        let clock = world.resource::<WeatheringClock>();
+        if clock.hz() != state.hz {
+            return Err(value(&path, "hz", state.hz, clock.hz().to_string()));
+        }
+        let Some(drying) = DryingClock::from_points(state.drying.clone()) else {
+            return Err(value(&path, "drying", "out of order", "in order of ticks, and finite".into()));
+        };
+
+        world.insert_resource(drying);
+        world.insert_resource(state.weather);
+        world.insert_resource(state.counts);
+        world.insert_resource(state.water.clone());
+        world.insert_resource(Digest(state.digest));
+        world.resource_mut::<WeatheringClock>().go_to(state.tick);
+        for (entity, emitter) in emitters.into_iter().zip(&state.emitters) {
+            if let Some(mut state) = world.get_mut::<EmitterState>(entity) {
+                *state = emitter.clone();
+            }
+        }
+        let particles: Vec<ParticleBundle> = state.particles.iter().map(|&saved| saved.into()).collect();
+        world.spawn_batch(particles);
+        let waiting = state.waiting.iter().map(|&saved| saved.into()).collect();
+        world.resource_mut::<NewParticles>().restore(waiting, state.next_sequence);
+        for (index, (entity, _)) in surfaces.into_iter().enumerate() {
+            self.restore_surface(world, index, entity);
+        }
+        Ok(())
+    }
+
+    fn restore_surface(&self, world: &mut World, index: usize, entity: Entity) {
+        let (state, saved) = (&self.state.surfaces[index], &self.surfaces[index]);
+        if let Some(mut totals) = world.get_mut::<SurfaceTotals>(entity) {
+            *totals = state.totals;
+        }
+        if let Some(mut queue) = world.get_mut::<crate::overlay::SplatQueue>(entity) {
+            queue.restore_traces(state.traces);
+        }
+        if let Some(mut traces) = world.get_mut::<SurfaceTraces>(entity) {
+            *traces = state.traces;
+        }
+        if let Some(mut water) = world.get_mut::<SurfaceWater>(entity) {
+            let (wrap, generation) = (water.wrap, water.generation + 1);
+            *water = saved.water.clone();
+            (water.wrap, water.generation) = (wrap, generation);
+        }
+        if let Some(mut overlays) = world.get::<Overlays>(entity).cloned() {
+            let mut images = world.resource_mut::<Assets<Image>>();
+            for (handle, bytes) in [
+                (&mut overlays.diffuse, &saved.colors.diffuse),
+                (&mut overlays.specular, &saved.colors.specular),
+                (&mut overlays.normal, &saved.colors.normal),
+            ] {
+                let Some(mut image) = images.get(&*handle).cloned() else { continue };
+                image.data = Some(bytes.clone());
+                image.asset_usage = RenderAssetUsages::RENDER_WORLD;
+                *handle = images.add(image);
+            }
+            world.entity_mut(entity).insert(overlays);
+        } else if let Some(surface) = world.get::<Weatherable>(entity) {
+            // Without a renderer there are none before the first tick.
+            let texels = |bytes: &[u8]| bytes.as_chunks::<4>().0.to_vec();
+            let maps = CpuMaps {
+                diffuse: texels(&saved.colors.diffuse),
+                specular: texels(&saved.colors.specular),
+                normal: texels(&saved.colors.normal),
+                ..CpuMaps::new(surface)
+            };
+            world.entity_mut(entity).insert(maps);
+        }
+    }
+}

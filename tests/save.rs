@@ -1,0 +1,170 @@
+//! The program again: scenes that are saved and gone on with, and where all the water is in the end.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::replay::{files_below, number, replay, run};
+
+/// Ten minutes of rain on a roof over a wall and a floor, in wind, with sun.
+const TEN_MINUTES: &str = r#"(
+    seconds: 600.0,
+    tick_hz: 20,
+    wind: (0.4, 0.0, -0.6),
+    weather: (temperature_c: 24.0, humidity: 0.3, sun_w_per_m2: 700.0, drying_speed: 3.0),
+    camera: (keys: [(eye: (0.0, 1.0, 2.0), target: (0.0, 0.0, 0.0))]),
+    materials: {
+        "tile": (porous: (capacity_mm: 0.1, sorptivity: 0.2, retained_mm: 0.05, efflorescence: 0.5, tide_mark: 0.5)),
+        "brick": (porous: (capacity_mm: 1.0, sorptivity: 2.0)),
+    },
+    surfaces: [
+        (
+            name: "roof",
+            mesh: Ground(size: (1.0, 1.0), cells: (3, 3)),
+            material: "tile",
+            position: (0.0, 1.0, 0.8),
+            rotation_deg: (25.0, 0.0, 0.0),
+            maps: (map_size: 64, wrap_u: Clamp, wrap_v: Clamp),
+        ),
+        (
+            name: "floor",
+            mesh: Ground(size: (2.0, 2.0), cells: (3, 3)),
+            material: "brick",
+            maps: (map_size: 64, wrap_u: Clamp, wrap_v: Clamp),
+        ),
+    ],
+    emitters: [
+        (
+            name: "rain",
+            effect: "rain.effect.ron",
+            rate: 160.0,
+            shape: Sky(half_size: (1.0, 1.0)),
+            speed: 6.0,
+            lifetime: 2.0,
+            stop: 420.0,
+            keys: [(position: (-0.1, 2.0, 0.2), target: (-0.1, 0.0, 0.2))],
+        ),
+    ],
+)"#;
+
+const RAIN: &str = "(water_mm3: 99.9, terminal_speed: 6.5, stamp_radius: 0.03, stamp_radius_jitter: 0.4)";
+
+/// The scenario in a folder of its own.
+fn ten_minutes(folder: &Path) -> std::path::PathBuf {
+    fs::write(folder.join("rain.effect.ron"), RAIN).unwrap();
+    let file = folder.join("rain.ron");
+    fs::write(&file, TEN_MINUTES).unwrap();
+    file
+}
+
+/// What of a report a run that was interrupted must share with one that was not.
+fn outcome(report: &Value) -> [&Value; 5] {
+    ["digest", "surfaces", "particles", "water", "ticks"].map(|field| &report[field])
+}
+
+#[test]
+fn all_water_is_accounted_for_after_ten_minutes_of_rain() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = run(&mut replay(ten_minutes(folder.path()), "--no-render")).report();
+    let water = &report["water"];
+    let part = |name: &str| number(&water[name]);
+    assert!(part("emitted_mm3") > 5_000_000.0, "{water}");
+    for name in ["on_surfaces_mm3", "evaporated_mm3", "run_off_mm3", "missed_mm3"] {
+        assert!(part(name) > 0.001 * part("emitted_mm3"), "{name} of {water}");
+    }
+    let found = part("on_surfaces_mm3")
+        + part("evaporated_mm3")
+        + part("run_off_mm3")
+        + part("missed_mm3")
+        + part("in_flight_mm3");
+    assert!((found / part("emitted_mm3") - 1.0).abs() < 1e-6, "{water}");
+    assert!(part("imbalance").abs() < 1e-6, "{water}");
+    // The roof has dripped, over the edge of the floor.
+    assert!(number(&report["surfaces"][0]["dripped_mm3"]) > 0.0, "{report}");
+}
+
+#[test]
+fn a_run_that_was_saved_goes_on_to_the_same_digest() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = ten_minutes(folder.path());
+    let (kept, again) = (folder.path().join("kept"), folder.path().join("again"));
+    let whole = run(&mut replay(&file, "--no-render --seconds 90")).report();
+    run(replay(&file, "--no-render --seconds 50 --save-state").arg(&kept)).assert_success();
+    let resumed = run(replay(&file, "--no-render --seconds 90 --resume").arg(&kept)).report();
+    assert_eq!(outcome(&resumed), outcome(&whole));
+    // What is restored and saved at once is the same to the byte.
+    let mut twice = replay(&file, "--no-render --seconds 50");
+    run(twice.arg("--resume").arg(&kept).arg("--save-state").arg(&again)).assert_success();
+    let names = files_below(&kept);
+    assert!(names.contains("roof_film.png") && names.contains("floor_tiles.png"), "{names:?}");
+    assert!(names.contains("roof_tide.png") && names.contains("state.ron"), "{names:?}");
+    assert_eq!(files_below(&again), names);
+    for name in names {
+        assert_eq!(fs::read(kept.join(&name)).unwrap(), fs::read(again.join(&name)).unwrap(), "{name}");
+    }
+}
+
+#[test]
+fn a_picture_does_not_change_what_is_saved_and_gone_on_with() {
+    if std::env::var("WEATHERING_SKIP_GPU").is_ok_and(|value| value == "1") {
+        eprintln!("skipped: needs a GPU, and WEATHERING_SKIP_GPU=1");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file = ten_minutes(folder.path());
+    let (numbers, drawn) = (folder.path().join("numbers"), folder.path().join("drawn"));
+    run(replay(&file, "--no-render --seconds 8 --save-state").arg(&numbers)).assert_success();
+    let mut command = replay(&file, "--fps 1 --size 32x32 --seconds 8 --save-state");
+    run(command.arg(&drawn)).assert_success();
+    for name in files_below(&numbers) {
+        assert_eq!(fs::read(numbers.join(&name)).unwrap(), fs::read(drawn.join(&name)).unwrap(), "{name}");
+    }
+    let whole = run(&mut replay(&file, "--no-render --seconds 12")).report();
+    let resumed = run(replay(&file, "--fps 1 --size 32x32 --seconds 12 --resume").arg(&drawn)).report();
+    assert_eq!(outcome(&resumed), outcome(&whole));
+}
+
+#[test]
+fn saved_scenes_that_do_not_fit_are_refused_by_file_and_field() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = ten_minutes(folder.path());
+    let kept = folder.path().join("kept");
+    run(replay(&file, "--no-render --seconds 10 --save-state").arg(&kept)).assert_success();
+    let out = folder.path().join("out");
+    let refused = |named: &[&str]| {
+        let mut command = replay(&file, "--no-render --seconds 20");
+        run(command.arg("--resume").arg(&kept).arg("--out").arg(&out)).assert_refused(named, &out);
+    };
+    let state = kept.join("state.ron");
+    let text = fs::read_to_string(&state).unwrap();
+    for (was, is, named) in [
+        ("version: 1", "version: 9", "`version` is 9"),
+        ("hz: 20", "hz: 60", "`hz` is 60"),
+        ("name: \"roof\"", "name: \"../roof\"", "`surfaces[0].name`"),
+        ("size: 64", "size: 65", "`surfaces[0].size`"),
+        ("seed: 0", "seeds: 0", "seeds"),
+    ] {
+        assert!(text.contains(was), "{was}");
+        fs::write(&state, text.replacen(was, is, 1)).unwrap();
+        refused(&["state.ron", named]);
+    }
+    fs::write(&state, &text).unwrap();
+    let map = kept.join("floor_film.png");
+    let bytes = fs::read(&map).unwrap();
+    fs::write(&map, &bytes[..bytes.len() / 2]).unwrap();
+    refused(&["floor_film.png"]);
+    fs::remove_file(&map).unwrap();
+    refused(&["floor_film.png"]);
+    fs::write(&map, &bytes).unwrap();
+    // Another scenario.
+    fs::write(&file, TEN_MINUTES.replace("rate: 160.0", "rate: 161.0")).unwrap();
+    refused(&["state.ron", "`scenario`"]);
+    // A folder that is something else is left alone.
+    let other = folder.path().join("other");
+    fs::create_dir(&other).unwrap();
+    fs::write(other.join("thesis.txt"), "mine").unwrap();
+    let outcome = run(replay(&file, "--no-render --seconds 1 --save-state").arg(&other));
+    assert_eq!(outcome.code, Some(2), "{}", outcome.stderr);
+    assert_eq!(fs::read_to_string(other.join("thesis.txt")).unwrap(), "mine");
+}
