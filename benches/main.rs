@@ -8,6 +8,7 @@
 //! | [`far`] | a particle with nothing near it | a loop over two arrays |
 //! | [`cast`] | closest hits of short segments, from 1,000 to 1,000,000 triangles | [`hoff`] |
 //! | [`shading`] | a frame full of a weathered surface | the same frame of a `StandardMaterial` |
+//! | [`wetting`] | water that runs, and surfaces at rest | a tick without surfaces |
 //! | [`splat`] | painting on the CPU, and sorting for the GPU | each other |
 //!
 //! `cargo bench --bench main` runs all of them, `cargo bench --bench main -- cast` one. Results, predictions
@@ -27,6 +28,7 @@ mod shading;
 mod sim;
 mod splat;
 mod tick;
+mod wetting;
 
 use std::time::Duration;
 
@@ -52,6 +54,6 @@ criterion_group! {
     config = config();
     // Memory first, while nothing has been given back to the allocator that it could hand out again.
     targets = bytes::bench, baseline_is_right, tick::bench, live::bench, far::bench, cast::bench, splat::bench,
-        shading::bench
+        wetting::bench, shading::bench
 }
 criterion_main!(benches);

@@ -30,3 +30,7 @@ for scenario in bricks flowerpot stone_on_sand porosity_row models cloth; do
     picture "${scenario}" 640x360 00000 "${scenario}_dry" 00004 "${scenario}_wet"
 done
 picture regions 1024x576 00005 regions
+picture bas_relief 640x480 00001 bas_relief_dry 00008 bas_relief_rain 00039 bas_relief_wet
+picture drying 640x480 00003 drying_wet 00016 drying_half 00034 drying_late
+picture roof_edge 640x480 00030 roof_edge
+picture stair 640x480 00020 stair_rain 00050 stair_puddles

@@ -398,3 +398,66 @@ fn games_can_ask_and_are_told() {
     assert_eq!(told(&mut scene), (0, 1));
     assert!(scene.0.world().resource::<WeatheringClock>().tick() > 0);
 }
+
+/// A slope of 20 degrees that ends in a wall below it: two islands of uv, turned against each other, with one edge in
+/// common.
+fn slope_and_wall() -> Mesh {
+    use bevy::asset::RenderAssetUsages;
+    use bevy::mesh::{Indices, PrimitiveTopology};
+    let (rise, run) = 20f32.to_radians().sin_cos();
+    let positions: Vec<[f32; 3]> = vec![
+        // The slope: upper edge, then the edge in common.
+        [-0.5, 0.5 + rise, 0.5 - run],
+        [0.5, 0.5 + rise, 0.5 - run],
+        [-0.5, 0.5, 0.5],
+        [0.5, 0.5, 0.5],
+        // The wall: the edge in common, then the lower edge.
+        [-0.5, 0.5, 0.5],
+        [0.5, 0.5, 0.5],
+        [-0.5, -0.5, 0.5],
+        [0.5, -0.5, 0.5],
+    ];
+    let uvs: Vec<[f32; 2]> = vec![
+        // v runs down the slope ...
+        [0.05, 0.05],
+        [0.45, 0.05],
+        [0.05, 0.45],
+        [0.45, 0.45],
+        // ... and u down the wall.
+        [0.55, 0.95],
+        [0.55, 0.55],
+        [0.95, 0.95],
+        [0.95, 0.55],
+    ];
+    let normals: Vec<[f32; 3]> = [[0.0, run, rise]; 4].into_iter().chain([[0.0, 0.0, 1.0]; 4]).collect();
+    Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
+        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, normals)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, uvs)
+        .with_inserted_indices(Indices::U32(vec![0, 2, 1, 1, 2, 3, 4, 6, 5, 5, 6, 7]))
+}
+
+#[test]
+fn water_runs_over_a_seam_from_a_slope_to_a_wall_and_to_nowhere_else() {
+    let mut scene = Scene::new(60);
+    let smooth = PorousMaterial { capacity_mm: 0.0, retained_mm: 0.05, ..default() };
+    let body = scene.surface(slope_and_wall(), 128, smooth, Transform::from_xyz(0.0, 2.0, 0.0));
+    for _ in 0..20 {
+        scene.pour(body, Vec2::new(0.25, 0.15), 4, 2_000_000);
+        scene.run(10);
+    }
+    scene.run(60 * 20);
+    let film = |scene: &mut Scene, u: f32, v: f32| scene.at(body, Vec2::new(u, v)).film_mm;
+    // Straight down: the middle of the slope's width is the middle of the wall's.
+    assert!(film(&mut scene, 0.25, 0.43) > 0.02, "down the slope");
+    assert!(film(&mut scene, 0.58, 0.75) > 0.02, "over the edge");
+    assert!(film(&mut scene, 0.9, 0.75) > 0.02, "down the wall");
+    for (u, v) in [(0.07, 0.3), (0.43, 0.3), (0.7, 0.58), (0.7, 0.93)] {
+        assert_eq!(film(&mut scene, u, v), 0.0, "{u} {v}");
+    }
+    // All of it left at the lower edge or is still there: none at the upper end, nor at the seam.
+    let ledger = scene.water(body).ledger();
+    let held: u64 = scene.water(body).texels().iter().map(|texel| texel.total()).sum();
+    assert_eq!(ledger.received, held + ledger.dripped);
+    assert!(ledger.dripped > ledger.received / 4, "{ledger:?} {held}");
+}

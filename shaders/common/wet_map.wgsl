@@ -75,7 +75,7 @@ struct TexelWater {
     tick: u32,
     // From the lowest byte: how wet it looked then, exposure to air and to the sun, reserve.
     bytes: u32,
-    // Efflorescence, tide mark, how much of the film was to be seen.
+    // Efflorescence, tide mark, how much of the film was to be seen, nearness to a rim.
     marks: u32,
 }
 
@@ -228,8 +228,7 @@ fn texel_held(texel: vec2<i32>) -> Held {
     held.look.z *= now.film_mm;
 #ifdef WEATHERED_MARKS
     let dried = max(before.pores_mm - now.film_mm - now.pores_mm, 0.0) / MARK_FULL_MM;
-    let rim = max(1.0 - 3.0 * bytes.w, 0.0);
-    held.marks = min(held.marks + dried * vec2(1.0, MARK_RIM_GAIN * rim), vec2(1.0));
+    held.marks = min(held.marks + dried * vec2(1.0, MARK_RIM_GAIN * marks.w), vec2(1.0));
 #endif
     return held;
 }

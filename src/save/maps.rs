@@ -63,7 +63,7 @@ fn write_files(scene: &SavedScene, folder: &Path) -> Result<(), SaveError> {
             put("film", &words(&|texel| texel.film.to_le_bytes()), size)?;
             put("pores", &words(&|texel| texel.pores.to_le_bytes()), size)?;
             put("since", &words(&|texel| texel.tick.to_le_bytes()), size)?;
-            put("look", &words(&|texel| [texel.shown, texel.reserve, texel.filmed, 255]), size)?;
+            put("look", &words(&|texel| [texel.shown, texel.reserve, texel.filmed, texel.rim]), size)?;
             let tiles = surface.water.tile_states().flat_map(|(flags, patience)| [flags, patience]);
             let tiles: Vec<u8> = tiles.collect();
             let path = file(folder, &state.name, "tiles");
@@ -138,14 +138,14 @@ fn read_surface(folder: &Path, state: &SurfaceState) -> Result<SavedSurface, Sav
         let (film, pores, since, look) = (words("film")?, words("pores")?, words("since")?, map("look")?);
         let rows = film.iter().zip(&pores).zip(&since).zip(look.as_chunks::<4>().0);
         texels = rows
-            .map(|(((&film, &pores), &tick), &[shown, reserve, filmed, _])| TexelWater {
+            .map(|(((&film, &pores), &tick), &[shown, reserve, filmed, rim])| TexelWater {
                 film,
                 pores,
                 tick,
                 shown,
                 reserve,
                 filmed,
-                pad: 0,
+                rim,
             })
             .collect();
         let bytes = read_png(&file(folder, &state.name, "tiles"), state.size / TILE_SIZE, 2)?;

@@ -8,7 +8,7 @@
 //! |---|---|
 //! | `state.ron` | version, time, weather, emitters, particles in flight, accounts |
 //! | `<surface>_film.png`, `_pores.png`, `_since.png` | a texel's words, the lowest byte in red, the highest in alpha |
-//! | `<surface>_look.png` | how wet it looked, reserve, how much of its film was seen |
+//! | `<surface>_look.png` | how wet it looked, reserve, how much of its film was seen, nearness to a rim |
 //! | `<surface>_efflorescence.png`, `_tide.png` | bits of `f32`, as above; if the material leaves marks |
 //! | `<surface>_tiles.png` | flags and patience of its tiles |
 //! | `<surface>_diffuse.png`, `_specular.png`, `_normal.png` | colour maps, premultiplied |

@@ -37,8 +37,7 @@ pub fn humidity_ratio(temperature_c: f64) -> f64 {
 /// Water that evaporates from a free wet surface, mm/h (kg/m² h): `(25 + 19 v)(x_s - x)`, the engineering formula for open
 /// water. `humidity` 0..=1, `wind` m/s. Frozen water stays.
 pub fn evaporation_mm_per_h(temperature_c: f64, humidity: f64, wind: f64) -> f64 {
-    // Written so that NaN is nothing.
-    if !(temperature_c > 0.0) {
+    if temperature_c.is_nan() || temperature_c <= 0.0 {
         return 0.0;
     }
     let dryness = 1.0 - humidity.clamp(0.0, 1.0);

@@ -4,7 +4,7 @@ use bevy::math::Affine3A;
 use bevy::prelude::*;
 
 use super::geometry::{Link, Side};
-use super::{SurfaceWater, TexelGeometry, WetGeometry};
+use super::{TexelGeometry, WetGeometry};
 use crate::clock::WeatheringClock;
 use crate::collision::{MeshTriangles, SurfaceCollider};
 use crate::effect::{EffectIndex, EffectTable, WeatherEffect};
@@ -112,12 +112,5 @@ fn start_of(
             point + out * (0.5 * geometry.distance(drip.texel, side) + CLEARANCE) + off
         }
         _ => point + off,
-    }
-}
-
-impl SurfaceWater {
-    /// Whether a drip could leave it at all.
-    pub fn has_dripped(&self) -> bool {
-        self.ledger().dripped > 0
     }
 }

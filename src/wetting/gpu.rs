@@ -32,7 +32,7 @@ pub struct GpuTexelWater {
     pub tick: u32,
     /// From the lowest byte: how wet it looked then, exposure to air, exposure to the sun, reserve.
     pub bytes: u32,
-    /// From the lowest byte: efflorescence, tide mark, how much of the film was to be seen; the rest is 0.
+    /// From the lowest byte: efflorescence, tide mark, how much of the film was to be seen, nearness to a rim.
     pub marks: u32,
 }
 
@@ -166,7 +166,7 @@ pub(super) fn pack_texel(
     let marks = water.marks.get(texel as usize).copied().unwrap_or_default();
     let Marks { efflorescence, tide } = marks;
     let byte = |part: f32| (part * 255.0).round().clamp(0.0, 255.0) as u8;
-    let marks = u32::from_le_bytes([byte(efflorescence), byte(tide), state.filmed, 0]);
+    let marks = u32::from_le_bytes([byte(efflorescence), byte(tide), state.filmed, state.rim]);
     if state.is_dry() {
         return GpuTexelWater { marks, ..default() };
     }

@@ -24,8 +24,8 @@ impl Marks {
     /// How much faster a tide mark grows, which draws water from around it.
     pub const RIM_GAIN: f64 = 6.0;
 
-    /// `dried_mm`: water that has evaporated from the pores; `reserve`: of the texel, which is small near a rim.
-    pub(crate) fn grow(&mut self, material: &PorousMaterial, dried_mm: f64, reserve: u8) {
+    /// `dried_mm`: water that has evaporated from the pores; `rim`: how near the texel is to one, 255 on it.
+    pub(crate) fn grow(&mut self, material: &PorousMaterial, dried_mm: f64, rim: u8) {
         if dried_mm <= 0.0 {
             return;
         }
@@ -34,13 +34,8 @@ impl Marks {
             self.efflorescence = (f64::from(self.efflorescence) + part).min(1.0) as f32;
         }
         if material.tide_mark > 0.0 {
-            self.tide = (f64::from(self.tide) + Self::RIM_GAIN * part * rim(reserve)).min(1.0) as f32;
+            self.tide =
+                (f64::from(self.tide) + Self::RIM_GAIN * part * f64::from(rim) / 255.0).min(1.0) as f32;
         }
     }
-}
-
-/// How near a rim a texel is by its reserve: 1 on it, 0 well inside.
-pub fn rim(reserve: u8) -> f64 {
-    let inside = f64::from(reserve) / 255.0;
-    (1.0 - inside * 3.0).max(0.0)
 }

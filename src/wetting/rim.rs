@@ -10,6 +10,9 @@ use super::surface::{Now, SurfaceWater};
 /// Steps from the rim to where a texel no longer knows of it.
 pub const REACH: u32 = 24;
 
+/// Steps from the rim over which it leaves tide marks.
+const MARKED: u32 = 8;
+
 /// Seconds without new water after which a shower is over.
 pub const SHOWER_SECONDS: f32 = 0.5;
 
@@ -85,7 +88,10 @@ pub(crate) fn measure_rims(water: &mut SurfaceWater, now: &Now, scratch: &mut Ri
         water.settle(now, texel);
         let tile = water.tile_of(texel);
         water.tiles.touch(tile);
-        water.texels[texel as usize].reserve = ((steps - 1) * 255 / REACH) as u8;
+        let inside = steps - 1;
+        let water = &mut water.texels[texel as usize];
+        water.reserve = (inside * 255 / REACH) as u8;
+        water.rim = (255 - (inside * 255 / MARKED).min(255)) as u8;
     }
     true
 }

@@ -305,7 +305,7 @@ impl SurfaceWater {
             return scale.amounts(water);
         }
         if water.is_dry() {
-            (water.tick, water.shown, water.filmed) = (now.tick, 0, 0);
+            *water = TexelWater { tick: now.tick, ..default() };
             return Amounts::default();
         }
         let amounts = now.amounts(&scale, texel, water);
@@ -314,7 +314,7 @@ impl SurfaceWater {
         self.ledger.evaporated += scale.commit(water, amounts, look, now.tick);
         if let Some(marks) = self.marks.get_mut(texel as usize) {
             let left = amounts.film_mm + amounts.pores_mm;
-            marks.grow(now.material, pores_before - left, water.reserve);
+            marks.grow(now.material, pores_before - left, water.rim);
         }
         amounts
     }

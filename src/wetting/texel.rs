@@ -26,8 +26,8 @@ pub struct TexelWater {
     pub reserve: u8,
     /// How much of its film was to be seen at the reference tick, 0..=255.
     pub filmed: u8,
-    /// Always 0.
-    pub pad: u8,
+    /// How near the rim of a wet patch it lies, 255 on it; 0 well inside, or while nobody has looked.
+    pub rim: u8,
 }
 
 impl TexelWater {
