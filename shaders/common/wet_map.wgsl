@@ -199,9 +199,10 @@ struct Held {
     marks: vec2<f32>,
 }
 
-// Water that has to dry in one place until there is no more to see, mm, and how much faster a tide mark grows.
+// Water that has to dry in one place until there is no more efflorescence to see, mm, and what a cycle adds to a tide mark:
+// as in `src/wetting/marks.rs`.
 const MARK_FULL_MM: f32 = 2.0;
-const MARK_RIM_GAIN: f32 = 6.0;
+const TIDE_PER_CYCLE: f32 = 0.35;
 
 // A texel of the state; tiles lie one after the other.
 fn texel_held(texel: vec2<i32>) -> Held {
@@ -227,8 +228,9 @@ fn texel_held(texel: vec2<i32>) -> Held {
     held.look = water_look(now.pores_mm, porous.visible_mm, shown, seconds, porous.t_fill);
     held.look.z *= now.film_mm;
 #ifdef WEATHERED_MARKS
-    let dried = max(before.pores_mm - now.film_mm - now.pores_mm, 0.0) / MARK_FULL_MM;
-    held.marks = min(held.marks + dried * vec2(1.0, MARK_RIM_GAIN * marks.w), vec2(1.0));
+    let dried = max(before.pores_mm - now.film_mm - now.pores_mm, 0.0);
+    let cycle = min(dried / porous.visible_mm, 1.0) * marks.w;
+    held.marks = min(held.marks + vec2(dried / MARK_FULL_MM, TIDE_PER_CYCLE * cycle), vec2(1.0));
 #endif
     return held;
 }

@@ -21,8 +21,8 @@ pub struct Marks {
 impl Marks {
     /// Water, mm, that has to dry in one place until there is no more to see.
     pub const FULL_MM: f64 = 2.0;
-    /// How much faster a tide mark grows, which draws water from around it.
-    pub const RIM_GAIN: f64 = 6.0;
+    /// What one cycle adds to a tide mark on the rim. It does not depend on the water there, since that comes from inside.
+    pub const TIDE_PER_CYCLE: f64 = 0.35;
 
     /// `dried_mm`: water that has evaporated from the pores; `rim`: how near the texel is to one, 255 on it.
     pub(crate) fn grow(&mut self, material: &PorousMaterial, dried_mm: f64, rim: u8) {
@@ -34,8 +34,8 @@ impl Marks {
             self.efflorescence = (f64::from(self.efflorescence) + part).min(1.0) as f32;
         }
         if material.tide_mark > 0.0 {
-            self.tide =
-                (f64::from(self.tide) + Self::RIM_GAIN * part * f64::from(rim) / 255.0).min(1.0) as f32;
+            let cycle = (dried_mm / material.seen_mm()).min(1.0) * f64::from(rim) / 255.0;
+            self.tide = (f64::from(self.tide) + Self::TIDE_PER_CYCLE * cycle).min(1.0) as f32;
         }
     }
 }

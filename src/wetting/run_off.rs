@@ -30,8 +30,8 @@ const MOST_RETAINED: f64 = 1.7;
 const BRIDGED_MM: f32 = 0.1;
 /// Water runs where its surface falls by more than this to the next texel, mm.
 const LEVEL_MM: f32 = 0.01;
-/// A step moves no less than this, mm: what would creep is at rest.
-const LEAST_MOVE_MM: f32 = 1.0e-3;
+/// Nothing moves slower than this, mm of film a second: what would creep is at rest.
+const LEAST_MM_PER_S: f32 = 4.0e-3;
 /// A film on a level edge holds until it is this deep: the capillary length of water, mm.
 const EDGE_HOLDS_MM: f32 = 2.73;
 /// A drop falls when it is this large, mm³ (a dripping tap: 20 to 50), or so deep, mm.
@@ -251,7 +251,7 @@ fn give(
     let unit_mm = now.scale(water.units, donor.texel).unit_mm as f32;
     for (to, mm, inside) in out {
         let mm = mm * scale;
-        if mm > LEAST_MOVE_MM {
+        if mm > LEAST_MM_PER_S * seconds {
             moves.push(Move { from: donor.texel, to, units: (mm / unit_mm) as u32, inside });
         }
     }
