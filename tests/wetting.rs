@@ -470,3 +470,52 @@ fn water_runs_over_a_seam_from_a_slope_to_a_wall_and_to_nowhere_else() {
     assert_eq!(ledger.received, held + ledger.dripped);
     assert!(ledger.dripped > ledger.received / 4, "{ledger:?} {held}");
 }
+
+#[test]
+fn sun_wind_and_open_places_dry_first() {
+    let mut scene = Scene::new(60);
+    let material =
+        PorousMaterial { capacity_mm: 0.2, visible_mm: 0.2, rim_delay: 0.0, sorptivity: 0.0, ..default() };
+    let sunny = Weather {
+        sun_w_per_m2: 800.0,
+        sun_direction: Vec3::new(0.2, -1.0, 0.0),
+        drying_speed: 0.0,
+        ..default()
+    };
+    scene.0.insert_resource(sunny);
+    // A floor with a wall on it, and half of it under a low roof.
+    let floor =
+        scene.surface(ground(Vec2::splat(2.0), UVec2::splat(4)).unwrap(), 64, material, Transform::default());
+    let upright =
+        Transform::from_xyz(0.5, 0.5, 0.0).with_rotation(Quat::from_rotation_z(std::f32::consts::FRAC_PI_2));
+    scene.surface(ground(Vec2::new(1.0, 2.0), UVec2::splat(2)).unwrap(), 16, glazed(), upright);
+    let roof = Transform::from_xyz(-0.6, 0.8, 0.0);
+    scene.surface(ground(Vec2::new(0.8, 2.4), UVec2::splat(2)).unwrap(), 16, glazed(), roof);
+    // Until rays have been cast against all three.
+    for _ in 0..300 {
+        scene.0.update();
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    assert!(!scene.0.world().resource::<bevy_weathering::wetting::ExposureProgress>().is_busy());
+    let geometry = scene.0.world().get::<WetGeometry>(floor).unwrap().0.clone();
+    let wet = |scene: &mut Scene| {
+        let tick = scene.0.world().resource::<WeatheringClock>().tick();
+        let mut water = scene.0.world_mut().get_mut::<SurfaceWater>(floor).unwrap();
+        water.cover(&geometry, 0.0, 0.2, tick);
+    };
+    wet(&mut scene);
+    let left = |scene: &mut Scene, u: f32| scene.at(floor, Vec2::new(u, 0.5)).absorbed_mm;
+    scene.0.world_mut().resource_mut::<Weather>().drying_speed = 100.0;
+    scene.run(60 * 4);
+    // u grows with x: under the roof, in the open, and close to the wall, on the side that the sun shines on.
+    let (under, open, corner) = (left(&mut scene, 0.2), left(&mut scene, 0.52), left(&mut scene, 0.735));
+    assert!(open < 0.9 * under, "sun: {open} {under}");
+    assert!(open < corner - 0.001, "an open place dries before a corner: {open} {corner}");
+    // The same with wind.
+    let still = 0.2 - under;
+    scene.0.world_mut().resource_mut::<Weather>().wind = Vec3::X * 6.0;
+    let before = under;
+    scene.run(60 * 4);
+    let windy = before - left(&mut scene, 0.2);
+    assert!(windy > 2.0 * still, "wind: {still} {windy}");
+}

@@ -13,12 +13,11 @@ use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
 use super::points::surface_points;
-use super::prepare::Measured;
 use super::{Now, SurfaceWater, TexelGeometry, WetGeometry};
 use crate::clock::WeatheringClock;
-use crate::collision::{CollisionScene, MeshBvh, MeshColliders, SurfaceCollider};
+use crate::collision::{CollisionScene, MeshBvh, MeshColliders, NotWeatherable, SurfaceCollider};
 use crate::material::PorousMaterial;
-use crate::overlay::Wrap;
+use crate::overlay::{Weatherable, Wrap};
 use crate::weather::{DryingClock, Weather};
 use crate::wetmap::{accessibility, sun_visibility};
 
@@ -148,6 +147,8 @@ fn between_cells(grid: &[[f32; 2]], cells: u32, side: u32, wrap: [Wrap; 2], x: u
 #[derive(Resource, Default)]
 pub struct ExposureProgress {
     task: Option<Task<Vec<(Entity, Arc<TexelGeometry>, Exposure)>>>,
+    /// How many there were when it began.
+    surfaces: usize,
 }
 
 impl ExposureProgress {
@@ -179,7 +180,7 @@ type Exposed = (
     Option<&'static mut Exposure>,
 );
 
-/// Casts rays for surfaces that have no exposure yet, or whose sun has moved.
+/// Casts rays for all surfaces when one is new or gone, or the sun has moved.
 pub(super) fn bake_exposure(
     mut commands: Commands,
     clock: Res<WeatheringClock>,
@@ -187,7 +188,7 @@ pub(super) fn bake_exposure(
     weather: Res<Weather>,
     colliders: Res<MeshColliders>,
     mut progress: ResMut<ExposureProgress>,
-    unmeasured: Query<(), (With<Measured>, Without<WetGeometry>)>,
+    unmeasured: Query<(), (With<Weatherable>, Without<WetGeometry>, Without<NotWeatherable>)>,
     mut surfaces: Query<Exposed>,
 ) {
     if let Some(task) = &mut progress.task {
@@ -214,6 +215,7 @@ pub(super) fn bake_exposure(
         }
         return;
     }
+    // Everything that can be in the way has to be there, or it would depend on what was loaded first.
     if colliders.building() > 0 || !unmeasured.is_empty() {
         return;
     }
@@ -222,20 +224,21 @@ pub(super) fn bake_exposure(
         (Some(old), Some(new)) => old.dot(new) < SUN_MOVED,
         (old, new) => old.is_some() != new.is_some(),
     };
-    let wanted =
-        surfaces.iter().any(|(.., exposure)| exposure.is_none_or(|exposure| moved(exposure.towards_sun)));
-    if !wanted {
+    // What is new is in the way of the others, too.
+    let count = surfaces.iter().len();
+    let wanted = count != progress.surfaces
+        || surfaces.iter().any(|(.., exposure)| exposure.is_none_or(|exposure| moved(exposure.towards_sun)));
+    if !wanted || count == 0 {
         return;
     }
+    progress.surfaces = count;
     let mut jobs: Vec<Job> = Vec::new();
     let mut scene = Vec::new();
-    for (surface, geometry, collider, transform, water, _, exposure) in &surfaces {
+    for (surface, geometry, collider, transform, water, ..) in &surfaces {
         let (world_from_mesh, bvh) = (transform.affine(), collider.0.clone());
         scene.push((surface, world_from_mesh, bvh.clone()));
-        if exposure.is_none_or(|exposure| moved(exposure.towards_sun)) {
-            let (size, wrap) = (water.size, water.wrap);
-            jobs.push(Job { surface, geometry: geometry.0.clone(), bvh, world_from_mesh, size, wrap });
-        }
+        let (size, wrap) = (water.size, water.wrap);
+        jobs.push(Job { surface, geometry: geometry.0.clone(), bvh, world_from_mesh, size, wrap });
     }
     scene.sort_unstable_by_key(|(entity, ..)| *entity);
     progress.task = Some(AsyncComputeTaskPool::get().spawn(async move {

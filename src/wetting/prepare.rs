@@ -22,6 +22,8 @@ pub(super) struct Measured {
     bvh: Arc<MeshBvh>,
     /// Turn and scale; where it stands does not matter.
     matrix: Mat3A,
+    /// A change may have come while it was being measured.
+    late: bool,
     task: Option<Task<TexelGeometry>>,
 }
 
@@ -58,9 +60,11 @@ type Measurable = (
 pub(super) fn measure_surfaces(mut commands: Commands, mut surfaces: Query<Measurable>) {
     for (entity, surface, collider, areas, transform, mut measured, mut water) in &mut surfaces {
         let changed = surface.is_changed() || collider.is_changed() || transform.is_changed();
+        // What is being measured is finished first: a surface that keeps turning is measured as fast as that goes.
         let stale = match &measured {
             None => true,
-            Some(measured) => changed && !measured.is_of(&surface, &collider, &transform),
+            Some(measured) if measured.task.is_some() => false,
+            Some(measured) => (changed || measured.late) && !measured.is_of(&surface, &collider, &transform),
         };
         let (size, wrap) = (surface.texels(), surface.wrap());
         if stale {
@@ -79,10 +83,23 @@ pub(super) fn measure_surfaces(mut commands: Commands, mut surfaces: Query<Measu
                 TexelGeometry::new(triangles.triangles(), &affine, Vec3::Y, size, wrap)
             });
             let matrix = affine.matrix3;
-            commands.entity(entity).insert(Measured { size, wrap, bvh, matrix, task: Some(task) });
+            let measured = Measured { size, wrap, bvh, matrix, late: false, task: Some(task) };
+            commands.entity(entity).insert(measured);
             continue;
         }
-        let Some(geometry) = measured.as_mut().and_then(|measured| measured.finished()) else { continue };
+        let Some(measured) = &mut measured else { continue };
+        if measured.task.is_none() {
+            if measured.late {
+                measured.late = false;
+            }
+            continue;
+        }
+        let Some(geometry) = measured.finished() else { continue };
+        // It may have changed in the meantime.
+        measured.late = true;
+        if geometry.size() != size || measured.wrap != wrap || !Arc::ptr_eq(&measured.bvh, &collider.0) {
+            continue;
+        }
         let mut entity = commands.entity(entity);
         entity.insert(WetGeometry(Arc::new(geometry))).remove::<Exposure>();
         if water.is_none() {
