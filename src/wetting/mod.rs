@@ -1,13 +1,13 @@
 //! Water in and on matter: it arrives, is absorbed, runs, spreads and dries.
 //!
-//! Impacts leave [`Drop`]s, which are shared out among the texels under their stamps, in exact volumes ([`soak`]). From then
+//! Impacts leave [`Drop`]s, which are shared out among the texels under their stamps, in exact volumes (`soak`). From then
 //! on a texel holds a film and absorbed water, true at its reference tick; what it holds now is a closed form of time
 //! ([`evolve`]), worked out where somebody asks: here, when water moves, and in the shader. So matter absorbs and dries
 //! without any work, and a surface at rest costs nothing.
 //!
-//! Only what moves takes steps, on the tiles where it does: films run over the mesh ([`run_off`]), leave it as [`drip`]s that
+//! Only what moves takes steps, on the tiles where it does: films run over the mesh (`run_off`), leave it as drips that
 //! are particles again, and pores share what they hold ([`spread`]). When a shower is over, wet patches learn where their
-//! [`rim`] is, which dries first. [`Exposure`] says how well air and sun get at each texel, by rays.
+//! rim is, which dries first. [`Exposure`] says how well air and sun get at each texel, by rays.
 //!
 //! All of this is in the main world, in the tick, with and without a renderer: one owner, whole numbers, no way back from the
 //! GPU to wait for. What is drawn gets the tiles that changed ([`gpu`]).
