@@ -5,6 +5,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::{LoadedScenario, ScenarioError};
+use crate::scenes::gltf_mesh::percent_decoded;
 
 impl LoadedScenario {
     /// Checks that a glTF and every buffer and image it refers to exist inside the tree.
@@ -35,23 +36,6 @@ fn json_chunk(bytes: &[u8]) -> Option<&[u8]> {
     let bytes = bytes.strip_prefix(b"glTF")?;
     let length = u32::from_le_bytes(bytes.get(8..12)?.try_into().ok()?);
     bytes.get(16..)?.get(..length as usize)
-}
-
-/// A URI without its `%XX`; `None` if what they stand for is no text.
-fn percent_decoded(uri: &str) -> Option<String> {
-    let mut bytes = Vec::new();
-    let mut rest = uri.as_bytes();
-    while let [first, tail @ ..] = rest {
-        let hex = (*first == b'%').then(|| std::str::from_utf8(tail.get(..2)?).ok()).flatten();
-        if let Some(byte) = hex.and_then(|hex| u8::from_str_radix(hex, 16).ok()) {
-            bytes.push(byte);
-            rest = &tail[2..];
-        } else {
-            bytes.push(*first);
-            rest = tail;
-        }
-    }
-    String::from_utf8(bytes).ok()
 }
 
 #[cfg(test)]
