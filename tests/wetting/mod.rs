@@ -1,119 +1,18 @@
 //! Water in and on surfaces, in whole apps without a renderer: arrival, run-off, drips, drying, queries, accounts.
 
-use bevy::asset::AssetPlugin;
-use bevy::mesh::MeshPlugin;
+mod scene;
+
 use bevy::prelude::*;
-use bevy::time::TimeUpdateStrategy;
-use bevy_weathering::WeatheringPlugins;
-use bevy_weathering::clock::{ClockPlugin, WeatheringClock};
-use bevy_weathering::overlay::CpuOverlayPlugin;
+use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::particle::ParticleCounts;
 use bevy_weathering::prelude::*;
 use bevy_weathering::scenes::meshes::ground;
 use bevy_weathering::weather::Weather;
 use bevy_weathering::wetting::{
-    BecameWet, Dried, Drop, DropQueue, SurfaceWater, SurfaceWetness, WatchWetness, WetGeometry, Wetness,
-    WetnessQuery, WettingStats,
+    BecameWet, Dried, SurfaceWater, WatchWetness, WetGeometry, WetnessQuery, WettingStats,
 };
 
-/// A world with surfaces, at a tick rate.
-struct Scene(App);
-
-impl Scene {
-    fn new(hz: u32) -> Self {
-        let mut app = App::new();
-        app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default(), MeshPlugin))
-            .add_plugins(WeatheringPlugins.set(ClockPlugin { hz }))
-            .add_plugins(CpuOverlayPlugin)
-            .insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
-        app.world_mut().resource_mut::<Weather>().drying_speed = 0.0;
-        app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(std::time::Duration::from_secs(3600));
-        app.finish();
-        app.cleanup();
-        Self(app)
-    }
-
-    /// A surface, when its texels are measured.
-    fn surface(&mut self, mesh: Mesh, size: u32, material: PorousMaterial, transform: Transform) -> Entity {
-        let mesh = self.0.world_mut().resource_mut::<Assets<Mesh>>().add(mesh);
-        let maps = Weatherable { map_size: size, wrap_u: Wrap::Clamp, wrap_v: Wrap::Clamp };
-        let surface = self
-            .0
-            .world_mut()
-            .spawn((maps, material, Mesh3d(mesh), transform, GlobalTransform::from(transform)))
-            .id();
-        for _ in 0..100_000 {
-            if self.0.world().get::<SurfaceWater>(surface).is_some() {
-                return surface;
-            }
-            self.0.update();
-            std::thread::sleep(std::time::Duration::from_millis(1));
-        }
-        panic!("never measured");
-    }
-
-    fn emit(&mut self, emitter: Emitter, water_mm3: f32, stamp_radius: f32, at: Vec3) -> Entity {
-        let effect = WeatherEffect { water_mm3, stamp_radius, terminal_speed: 6.5, ..default() };
-        let effect = self.0.world_mut().resource_mut::<Assets<WeatherEffect>>().add(effect);
-        self.0.world_mut().spawn((Emitter { effect, ..emitter }, Transform::from_translation(at))).id()
-    }
-
-    fn run(&mut self, ticks: u32) {
-        self.0.insert_resource(TimeUpdateStrategy::FixedTimesteps(50));
-        for _ in 0..ticks / 50 {
-            self.0.update();
-        }
-        self.0.insert_resource(TimeUpdateStrategy::FixedTimesteps(ticks % 50));
-        self.0.update();
-        self.0.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
-    }
-
-    /// Water at a uv, without a particle.
-    fn pour(&mut self, surface: Entity, uv: Vec2, radius: i32, water_nl: u32) {
-        let size = self.water(surface).size() as f32;
-        let center = [uv.x, uv.y].map(|part| (part * size * 256.0) as i32);
-        let mut queue = self.0.world_mut().get_mut::<DropQueue>(surface).unwrap();
-        queue.0.push(Drop { center, radius: [radius * 256; 2], water_nl });
-    }
-
-    /// Whether a surface comes to rest within so many seconds.
-    fn rests(&mut self, surface: Entity, seconds: u32) -> bool {
-        let hz = self.0.world().resource::<WeatheringClock>().hz();
-        for _ in 0..seconds / 30 {
-            if self.water(surface).is_at_rest() {
-                return true;
-            }
-            self.run(30 * hz);
-        }
-        false
-    }
-
-    fn water(&self, surface: Entity) -> &SurfaceWater {
-        self.0.world().get::<SurfaceWater>(surface).unwrap()
-    }
-
-    fn at(&mut self, surface: Entity, uv: Vec2) -> Wetness {
-        let ask = move |query: WetnessQuery| query.at_uv(surface, uv).unwrap();
-        self.0.world_mut().run_system_once_with_nothing(ask)
-    }
-
-    fn over(&mut self, surface: Entity) -> SurfaceWetness {
-        let ask = move |query: WetnessQuery| query.over(surface).unwrap();
-        self.0.world_mut().run_system_once_with_nothing(ask)
-    }
-}
-
-/// `run_system_once`, without its error.
-trait RunOnce {
-    fn run_system_once_with_nothing<T: 'static, M>(&mut self, system: impl IntoSystem<(), T, M>) -> T;
-}
-
-impl RunOnce for World {
-    fn run_system_once_with_nothing<T: 'static, M>(&mut self, system: impl IntoSystem<(), T, M>) -> T {
-        use bevy::ecs::system::RunSystemOnce;
-        self.run_system_once(system).unwrap()
-    }
-}
+use self::scene::{RunOnce, Scene};
 
 /// Takes up nothing.
 fn glazed() -> PorousMaterial {
