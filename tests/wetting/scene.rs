@@ -1,7 +1,5 @@
 //! A world with surfaces and without a renderer.
 
-#![allow(unused_imports, reason = "shared with the tests")]
-
 use bevy::asset::AssetPlugin;
 use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
@@ -9,14 +7,9 @@ use bevy::time::TimeUpdateStrategy;
 use bevy_weathering::WeatheringPlugins;
 use bevy_weathering::clock::{ClockPlugin, WeatheringClock};
 use bevy_weathering::overlay::CpuOverlayPlugin;
-use bevy_weathering::particle::ParticleCounts;
 use bevy_weathering::prelude::*;
-use bevy_weathering::scenes::meshes::ground;
 use bevy_weathering::weather::Weather;
-use bevy_weathering::wetting::{
-    BecameWet, Dried, Drop, DropQueue, SurfaceWater, SurfaceWetness, WatchWetness, WetGeometry, Wetness,
-    WetnessQuery, WettingStats,
-};
+use bevy_weathering::wetting::{Drop, DropQueue, SurfaceWater, SurfaceWetness, Wetness, WetnessQuery};
 
 /// A world with surfaces, at a tick rate.
 pub struct Scene(pub App);
