@@ -8,7 +8,7 @@
 use std::hint::black_box;
 
 use bevy::prelude::*;
-use bevy_weathering::particle::{Lifespan, ParticleCounts, Position, Sequence, Velocity, Volume};
+use bevy_weathering::particle::{Lifespan, Particle, ParticleCounts, Particles, Sequence};
 use criterion::{Criterion, Throughput};
 
 use crate::measure::{self, Contender};
@@ -37,24 +37,24 @@ fn ours() -> impl FnMut() -> usize {
     let world = sim.world_mut();
     let mut random = Random::new();
     let lifespan = Lifespan { ticks_left: Lifespan::MAX_TICKS, born_at: 0 };
-    world.spawn_batch((0..PARTICLES as u32).map(|number| {
-        let position = Position(start(&mut random));
-        (position, Velocity(VELOCITY), lifespan, Volume(1000), Sequence(number), effect)
-    }));
+    let born: Vec<Particle> = (0..PARTICLES as u32)
+        .map(|number| {
+            let (position, sequence) = (start(&mut random), Sequence(number));
+            Particle { position, velocity: VELOCITY, lifespan, volume_nl: 1000, sequence, effect }
+        })
+        .collect();
+    world.resource_mut::<Particles>().spawn(born.into_iter());
     // So that the books balance.
     let mut counts = world.resource_mut::<ParticleCounts>();
     counts.emitted += PARTICLES as u64;
     counts.alive += PARTICLES as u64;
-    let mut particles = world.query::<(&mut Position, &mut Velocity, &mut Lifespan)>();
     let mut tick = 0;
     move || {
         if tick == FALL_TICKS {
             tick = 0;
-            for (mut position, mut velocity, mut life) in particles.iter_mut(sim.world_mut()) {
-                position.0.y = HEIGHT;
-                velocity.0 = VELOCITY;
-                *life = lifespan;
-            }
+            let mut particles = sim.world_mut().resource_mut::<Particles>();
+            particles.positions_mut().iter_mut().for_each(|position| position.y = HEIGHT);
+            particles.velocities_mut().fill(VELOCITY);
         }
         tick += 1;
         sim.tick()

@@ -13,8 +13,8 @@ use bevy::time::TimeUpdateStrategy;
 use bevy_weathering::WeatheringPlugins;
 use bevy_weathering::collision::SurfaceCollider;
 use bevy_weathering::effect::{EffectIndex, EffectTable, WeatherEffect};
-use bevy_weathering::overlay::{CpuOverlayPlugin, GpuOverlayPlugin, SplatQueue, TexelAreas, Weatherable};
-use bevy_weathering::particle::{Lifespan, ParticleCounts, Position, Sequence, Velocity};
+use bevy_weathering::overlay::{CpuOverlayPlugin, GpuOverlayPlugin, SplatQueue, TexelArea, Weatherable};
+use bevy_weathering::particle::{ParticleCounts, Particles};
 use bevy_weathering::replay::task_pools;
 use bevy_weathering::schedule::{WeatheringSystems, WeatheringTick};
 
@@ -109,11 +109,11 @@ impl Sim {
         for _ in 0..STEADY_TICKS {
             sim.frame();
         }
-        let mut particles = sim.app.world_mut().query::<(&Position, &Velocity, &Lifespan)>();
-        let living = particles.iter(sim.app.world()).map(|(position, velocity, lifespan)| HoffParticle {
-            position: position.0,
-            velocity: velocity.0,
-            age: LIFETIME - f32::from(lifespan.ticks_left) / HZ as f32,
+        let particles = sim.app.world().resource::<Particles>();
+        let living = particles.iter().map(|particle| HoffParticle {
+            position: particle.position,
+            velocity: particle.velocity,
+            age: LIFETIME - f32::from(particle.lifespan.ticks_left) / HZ as f32,
         });
         let living = living.collect();
         let births = std::mem::take(&mut sim.app.world_mut().resource_mut::<Births>().0);
@@ -158,10 +158,10 @@ impl Sim {
     }
 }
 
-fn note_births(mut births: ResMut<Births>, born: Query<(&Position, &Velocity), Added<Sequence>>) {
-    let born = born.iter().map(|(position, velocity)| HoffParticle {
-        position: position.0,
-        velocity: velocity.0,
+fn note_births(mut births: ResMut<Births>, particles: Res<Particles>) {
+    let born = particles.newborn().map(|particle| HoffParticle {
+        position: particle.position,
+        velocity: particle.velocity,
         age: 0.0,
     });
     births.0.push(born.collect());
@@ -169,7 +169,7 @@ fn note_births(mut births: ResMut<Births>, born: Query<(&Position, &Velocity), A
 
 /// Colliders are built in the background, in frames; no tick happens meanwhile.
 fn wait_for_colliders(app: &mut App) {
-    type Unfinished = (With<Weatherable>, Or<(Without<SurfaceCollider>, Without<TexelAreas>)>);
+    type Unfinished = (With<Weatherable>, Or<(Without<SurfaceCollider>, Without<TexelArea>)>);
     let mut unfinished = app.world_mut().query_filtered::<Entity, Unfinished>();
     app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
     let begun = Instant::now();

@@ -11,7 +11,7 @@ use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::collision::SurfaceImpact;
 use bevy_weathering::material::WeatheredMaterial;
 use bevy_weathering::overlay::{CpuOverlayPlugin, SurfaceTotals};
-use bevy_weathering::particle::{ParticleCounts, Position, integrate_particles};
+use bevy_weathering::particle::{ParticleCounts, Particles, integrate_particles};
 use bevy_weathering::prelude::*;
 use bevy_weathering::scenario::{Scenario, ScenarioPlugin};
 use bevy_weathering::wetting::SurfaceWater;
@@ -109,7 +109,7 @@ fn no_system_is_ambiguous_beside_all_of_bevy() {
     }
 
     // The count does rise.
-    fn pushes(_: Query<&mut Position>) {}
+    fn pushes(_: ResMut<Particles>) {}
     app.add_systems(PostUpdate, (pushes, integrate_particles));
     let count = |all: &[(_, Vec<String>)]| all.iter().map(|(_, pairs)| pairs.len()).sum::<usize>();
     assert!(count(&ambiguities(&mut app)) > count(&all));

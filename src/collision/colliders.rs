@@ -79,6 +79,7 @@ pub(super) fn watch_meshes(
 /// Starts building for meshes that are wanted and new, or changed, and collects what is finished.
 pub(super) fn build_colliders(
     meshes: Res<Assets<Mesh>>,
+    assets: Option<Res<AssetServer>>,
     mut colliders: ResMut<MeshColliders>,
     wanting: Query<&Mesh3d, Wanting>,
 ) {
@@ -93,10 +94,11 @@ pub(super) fn build_colliders(
             (collider.built, collider.task, *news) = (Some(built), None, true);
         }
         // A mesh that changes every frame is built as fast as it goes, one after the other.
-        if collider.stale
-            && collider.task.is_none()
-            && let Some(mesh) = meshes.get(*id)
-        {
+        if !collider.stale || collider.task.is_some() {
+            continue;
+        }
+        let load = || assets.as_ref().and_then(|assets| assets.get_load_state(*id));
+        if let Some(mesh) = meshes.get(*id) {
             collider.stale = false;
             match MeshTriangles::from_mesh(mesh) {
                 Ok(triangles) => {
@@ -105,6 +107,8 @@ pub(super) fn build_colliders(
                 }
                 Err(error) => (collider.built, *news) = (Some(Err(error)), true),
             }
+        } else if load().is_some_and(|state| state.is_failed()) {
+            (collider.stale, collider.built, *news) = (false, Some(Err(TriangleError::NotLoaded)), true);
         }
     }
 }

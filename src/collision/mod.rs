@@ -14,6 +14,7 @@
 //! [`Sequence`]: crate::particle::Sequence
 
 mod bvh;
+mod clearance;
 mod colliders;
 mod scene;
 mod trace;
@@ -81,6 +82,7 @@ impl Plugin for CollisionPlugin {
                     .chain()
                     .in_set(BuildColliders),
             )
+            .add_systems(PreUpdate, clearance::measure_clearance)
             .add_systems(
                 WeatheringTick,
                 (scene::update_collision_scene, trace_particles, trace::report_impacts)

@@ -6,6 +6,7 @@ use bevy::math::Affine3A;
 use bevy::prelude::*;
 
 use super::bvh::{BoxBvh, Segment};
+use super::clearance::Clearance;
 use super::{LocalHit, MeshBvh, SurfaceCollider};
 
 /// Every surface that can be hit, where it is now.
@@ -14,8 +15,10 @@ pub struct CollisionScene {
     instances: Vec<Instance>,
     top: BoxBvh,
     bounds: (Vec3, Vec3),
+    clearance: Option<Clearance>,
 }
 
+#[derive(Clone)]
 struct Instance {
     surface: Entity,
     world_from_mesh: Affine3A,
@@ -62,7 +65,7 @@ impl CollisionScene {
         let boxes: Vec<(Vec3, Vec3)> = instances.iter().map(Instance::bounds).collect();
         let top = BoxBvh::build(&boxes);
         let bounds = top.bounds();
-        Self { instances, top, bounds }
+        Self { instances, top, bounds, clearance: None }
     }
 
     /// Number of surfaces.
@@ -84,10 +87,32 @@ impl CollisionScene {
     #[inline]
     pub fn cast(&self, start: Vec3, end: Vec3) -> Option<SceneHit> {
         // Most particles are in the air: this is all they cost.
-        if !segment_near_box(start, end, self.bounds) {
+        if !segment_near_box(start, end, self.bounds)
+            || self.clearance.as_ref().is_some_and(|clearance| clearance.is_clear(start, end))
+        {
             return None;
         }
         self.cast_near(start, end)
+    }
+
+    /// Work that tells how far off everything is: nothing, for a scene that knows or has nothing.
+    pub(super) fn clearance_work(&self) -> Option<impl FnOnce() -> Option<Clearance> + Send + 'static> {
+        if self.is_empty() || self.clearance.is_some() {
+            return None;
+        }
+        let (instances, bounds) = (self.instances.clone(), self.bounds);
+        Some(move || {
+            let triangles = instances.iter().flat_map(|instance| {
+                let to_world = |corner| instance.world_from_mesh.transform_point3(corner);
+                instance.bvh.triangles().positions.iter().map(move |corners| corners.map(to_world))
+            });
+            Clearance::new(bounds, triangles)
+        })
+    }
+
+    /// What has been worked out for exactly this scene.
+    pub(super) fn set_clearance(&mut self, clearance: Option<Clearance>) {
+        self.clearance = clearance;
     }
 
     fn cast_near(&self, start: Vec3, end: Vec3) -> Option<SceneHit> {

@@ -1,13 +1,11 @@
 //! Casting what every particle moved, in parallel, with one order.
 
-use bevy::ecs::query::QueryItem;
 use bevy::prelude::*;
 use bevy::utils::Parallel;
 
 use super::{CollisionScene, Impact, Impacts};
 use crate::clock::WeatheringClock;
-use crate::effect::EffectIndex;
-use crate::particle::{Lifespan, Position, Sequence, Velocity, Volume, batching, swept_start};
+use crate::particle::{Particles, chunk_len, for_each_chunk, swept_start};
 
 /// Below this many particles one thread is faster than waking others.
 const PARALLEL_BATCH: usize = 1024;
@@ -21,60 +19,47 @@ pub struct ReportImpacts;
 #[derive(Message, Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceImpact(pub Impact);
 
-/// What the trace reads of a particle, and the lifespan it may end.
-type Traced = (
-    &'static Position,
-    &'static Velocity,
-    &'static mut Lifespan,
-    &'static Volume,
-    &'static Sequence,
-    &'static EffectIndex,
-);
-type TracedItem<'w, 's> = QueryItem<'w, 's, Traced>;
-
 /// Casts the segment each particle moved in this tick; what hits ends there and becomes an [`Impact`].
 pub fn trace_particles(
     clock: Res<WeatheringClock>,
     scene: Res<CollisionScene>,
     mut impacts: ResMut<Impacts>,
     mut per_thread: Local<Parallel<Vec<Impact>>>,
-    mut particles: Query<Traced>,
+    mut particles: ResMut<Particles>,
 ) {
     impacts.0.clear();
     if scene.is_empty() {
         return;
     }
     let tick = clock.delta_secs();
-    let trace = |found: &mut Vec<Impact>, particle: TracedItem| {
-        let (position, velocity, mut lifespan, volume, &sequence, &effect) = particle;
-        let end = position.0;
-        let start = swept_start(end, velocity.0, tick * lifespan.moving_part());
-        let Some(hit) = scene.cast(start, end) else { return };
-        lifespan.bypass_change_detection().mark_hit();
-        found.push(Impact {
-            sequence,
-            surface: hit.surface,
-            triangle: hit.triangle,
-            point: hit.point,
-            normal: hit.normal,
-            uv: hit.uv,
-            uv_per_metre: hit.uv_per_metre,
-            velocity: velocity.0,
-            effect,
-            volume_nl: volume.0,
-        });
-    };
-    if particles.iter().len() < PARALLEL_BATCH {
-        particles.iter_mut().for_each(|particle| trace(&mut impacts.0, particle));
-    } else {
-        let found = &*per_thread;
-        particles
-            .par_iter_mut()
-            .batching_strategy(batching(PARALLEL_BATCH))
-            .for_each_init(|| found.borrow_local_mut(), |found, particle| trace(found, particle));
-        for found in per_thread.iter_mut() {
-            impacts.0.append(found);
+    let Particles { positions, velocities, lifespans, volumes_nl, sequences, effects, .. } =
+        particles.bypass_change_detection();
+    let len = chunk_len(positions.len(), PARALLEL_BATCH);
+    let chunks = lifespans.chunks_mut(len).enumerate();
+    let (scene, per_thread_found) = (&*scene, &*per_thread);
+    for_each_chunk(chunks, |(chunk, lifespans)| {
+        let mut found = per_thread_found.borrow_local_mut();
+        for (index, lifespan) in (chunk * len..).zip(lifespans) {
+            let (end, velocity) = (positions[index], velocities[index]);
+            let start = swept_start(end, velocity, tick * lifespan.moving_part());
+            let Some(hit) = scene.cast(start, end) else { continue };
+            lifespan.mark_hit();
+            found.push(Impact {
+                sequence: sequences[index],
+                surface: hit.surface,
+                triangle: hit.triangle,
+                point: hit.point,
+                normal: hit.normal,
+                uv: hit.uv,
+                uv_per_metre: hit.uv_per_metre,
+                velocity,
+                effect: effects[index],
+                volume_nl: volumes_nl[index],
+            });
         }
+    });
+    for found in per_thread.iter_mut() {
+        impacts.0.append(found);
     }
     // Numbers are unique, so this order is the only one.
     impacts.0.sort_unstable_by_key(|impact| impact.sequence);
@@ -102,6 +87,8 @@ mod tests {
 
     use super::*;
     use crate::collision::{MeshBvh, MeshTriangles};
+    use crate::effect::EffectIndex;
+    use crate::particle::{Lifespan, Particle, Sequence};
 
     /// A square of 2 m at height 0, uv 0..1 along x and -z.
     fn world() -> (World, Entity) {
@@ -113,15 +100,22 @@ mod tests {
         world.insert_resource(CollisionScene::new([(surface, Affine3A::IDENTITY, bvh)]));
         world.insert_resource(WeatheringClock::new(10));
         world.init_resource::<Impacts>();
+        world.init_resource::<Particles>();
         world.init_resource::<Messages<SurfaceImpact>>();
         (world, surface)
     }
 
     /// A particle that moved from one point to another in the last tick.
-    fn particle(world: &mut World, from: Vec3, to: Vec3, number: u32) -> Entity {
-        let life = Lifespan { ticks_left: 5, born_at: 0 };
-        let velocity = Velocity((to - from) * 10.0);
-        world.spawn((Position(to), velocity, life, Volume(number), Sequence(number), EffectIndex(0))).id()
+    fn spawn(world: &mut World, from: Vec3, to: Vec3, number: u32) {
+        let particle = Particle {
+            position: to,
+            velocity: (to - from) * 10.0,
+            lifespan: Lifespan { ticks_left: 5, born_at: 0 },
+            volume_nl: number,
+            sequence: Sequence(number),
+            effect: EffectIndex(0),
+        };
+        world.resource_mut::<Particles>().spawn([particle].into_iter());
     }
 
     fn run(world: &mut World) {
@@ -133,14 +127,15 @@ mod tests {
     #[test]
     fn what_crossed_the_surface_hits_it_and_the_rest_flies_on() {
         let (mut world, surface) = world();
-        let down = particle(&mut world, Vec3::new(0.5, 0.1, 0.5), Vec3::new(0.5, -0.1, 0.5), 8);
-        let up = particle(&mut world, Vec3::new(-0.5, -0.3, 0.5), Vec3::new(-0.5, 0.1, 0.5), 3);
-        let above = particle(&mut world, Vec3::new(0.0, 0.4, 0.0), Vec3::new(0.0, 0.2, 0.0), 1);
-        let beside = particle(&mut world, Vec3::new(1.5, 0.1, 0.0), Vec3::new(1.5, -0.1, 0.0), 2);
+        spawn(&mut world, Vec3::new(0.5, 0.1, 0.5), Vec3::new(0.5, -0.1, 0.5), 8);
+        spawn(&mut world, Vec3::new(-0.5, -0.3, 0.5), Vec3::new(-0.5, 0.1, 0.5), 3);
+        spawn(&mut world, Vec3::new(0.0, 0.4, 0.0), Vec3::new(0.0, 0.2, 0.0), 1);
+        spawn(&mut world, Vec3::new(1.5, 0.1, 0.0), Vec3::new(1.5, -0.1, 0.0), 2);
         run(&mut world);
 
-        let has_hit = |entity| world.get::<Lifespan>(entity).unwrap().has_hit();
-        assert_eq!([down, up, above, beside].map(has_hit), [true, true, false, false]);
+        let has_hit: Vec<bool> =
+            world.resource::<Particles>().lifespans().iter().map(|life| life.has_hit()).collect();
+        assert_eq!(has_hit, [true, true, false, false]);
         let impacts = &world.resource::<Impacts>().0;
         assert_eq!(impacts.iter().map(|impact| impact.sequence.0).collect::<Vec<_>>(), [3, 8]);
         for impact in impacts {
@@ -157,9 +152,9 @@ mod tests {
     #[test]
     fn a_particle_born_late_in_the_tick_did_not_cross_what_lay_before() {
         let (mut world, _) = world();
-        let late = particle(&mut world, Vec3::new(0.0, 0.5, 0.0), Vec3::new(0.0, -0.5, 0.0), 1);
+        spawn(&mut world, Vec3::new(0.0, 0.5, 0.0), Vec3::new(0.0, -0.5, 0.0), 1);
         // It moved only the last quarter: from -0.25 on.
-        world.get_mut::<Lifespan>(late).unwrap().born_at = 0xC000;
+        world.resource_mut::<Particles>().lifespans[0].born_at = 0xC000;
         run(&mut world);
         assert!(world.resource::<Impacts>().0.is_empty());
     }
@@ -169,7 +164,7 @@ mod tests {
         let (mut world, _) = world();
         for number in (0..5000).rev() {
             let x = (number as f32 / 2500.0 - 1.0) * 0.99;
-            particle(&mut world, Vec3::new(x, 0.1, 0.2), Vec3::new(x, -0.1, 0.2), number);
+            spawn(&mut world, Vec3::new(x, 0.1, 0.2), Vec3::new(x, -0.1, 0.2), number);
         }
         run(&mut world);
         let found: Vec<u32> = world.resource::<Impacts>().0.iter().map(|impact| impact.volume_nl).collect();

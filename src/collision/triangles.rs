@@ -33,6 +33,9 @@ pub struct TriangleReport {
 #[derive(thiserror::Error, Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TriangleError {
+    /// Its asset could not be loaded.
+    #[error("it could not be loaded")]
+    NotLoaded,
     /// Only the GPU has the data.
     #[error("its data is only on the GPU; load it with `RenderAssetUsages::MAIN_WORLD` too")]
     NotOnCpu,

@@ -7,10 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{EmissionSeed, Emitter};
 use crate::clock::WeatheringClock;
 use crate::effect::EffectTable;
-use crate::particle::{
-    Lifespan, ParticleBundle, ParticleConfig, ParticleCounts, Position, Sequence, Velocity, Volume,
-    WaterCounts,
-};
+use crate::particle::{Lifespan, Particle, ParticleConfig, ParticleCounts, Particles, Sequence, WaterCounts};
 
 /// What an [`Emitter`] has sent out and still owes.
 #[derive(Component, Serialize, Deserialize, Debug, Clone, Default, PartialEq)]
@@ -46,10 +43,10 @@ impl EmitterState {
     }
 }
 
-/// Particles that [`spawn_particles`] will spawn; a buffer that keeps its capacity. Empty between ticks.
+/// Particles that [`spawn_particles`] will spawn; a buffer that keeps its capacity. Between ticks, drips wait in it.
 #[derive(Resource, Debug, Default)]
 pub struct NewParticles {
-    particles: Vec<ParticleBundle>,
+    particles: Vec<Particle>,
     next_sequence: u32,
 }
 
@@ -66,24 +63,24 @@ impl NewParticles {
     }
 
     /// Those that wait to be spawned.
-    pub(crate) fn waiting(&self) -> &[ParticleBundle] {
+    pub(crate) fn waiting(&self) -> &[Particle] {
         &self.particles
     }
 
     /// As they were when the run was saved.
-    pub(crate) fn restore(&mut self, waiting: Vec<ParticleBundle>, next_sequence: u32) {
+    pub(crate) fn restore(&mut self, waiting: Vec<Particle>, next_sequence: u32) {
         self.particles = waiting;
         self.next_sequence = next_sequence;
     }
 
     /// Water of those that wait to be spawned, nanolitres.
     pub fn waiting_nl(&self) -> u64 {
-        self.particles.iter().map(|particle| u64::from(particle.3.0)).sum()
+        self.particles.iter().map(|particle| u64::from(particle.volume_nl)).sum()
     }
 
     /// Adds one more particle, which gets the next number.
-    pub fn push(&mut self, particle: impl FnOnce(u32) -> ParticleBundle) {
-        self.particles.push(particle(self.next_sequence));
+    pub fn push(&mut self, particle: impl FnOnce(Sequence) -> Particle) {
+        self.particles.push(particle(Sequence(self.next_sequence)));
         self.next_sequence = self.next_sequence.wrapping_add(1);
     }
 }
@@ -131,24 +128,30 @@ pub fn emit_particles(
         for i in 0..count {
             let (position, velocity) = emitter.sample(&world_from_emitter, &mut rng);
             let born_at = ((first + f64::from(i) * interval) * 65_536.0).clamp(0.0, 65_535.0) as u16;
-            let volume = state.water_nl(effect.water_mm3);
-            water.emitted_nl += u64::from(volume);
-            let life = Lifespan { ticks_left, born_at };
-            let particle = (Position(position), Velocity(velocity), life, Volume(volume));
-            new.push(|number| (particle.0, particle.1, particle.2, particle.3, Sequence(number), index));
+            let volume_nl = state.water_nl(effect.water_mm3);
+            water.emitted_nl += u64::from(volume_nl);
+            let lifespan = Lifespan { ticks_left, born_at };
+            new.push(|sequence| Particle {
+                position,
+                velocity,
+                lifespan,
+                volume_nl,
+                sequence,
+                effect: index,
+            });
         }
         state.rng = Some(rng);
     }
 }
 
 /// Spawns what [`emit_particles`] wrote, in one batch.
-pub fn spawn_particles(world: &mut World) {
-    // Taken out and put back, so that the buffer survives.
-    let mut particles = std::mem::take(&mut world.resource_mut::<NewParticles>().particles);
-    let count = particles.len() as u64;
-    world.spawn_batch(particles.drain(..));
-    world.resource_mut::<NewParticles>().particles = particles;
-    let mut counts = world.resource_mut::<ParticleCounts>();
+pub fn spawn_particles(
+    mut new: ResMut<NewParticles>,
+    mut particles: ResMut<Particles>,
+    mut counts: ResMut<ParticleCounts>,
+) {
+    let count = new.particles.len() as u64;
+    particles.spawn(new.particles.drain(..));
     counts.emitted += count;
     counts.alive += count;
 }
@@ -167,6 +170,7 @@ mod tests {
         world.init_resource::<ParticleCounts>();
         world.init_resource::<WaterCounts>();
         world.init_resource::<NewParticles>();
+        world.init_resource::<Particles>();
         let mut table = EffectTable::default();
         table.insert(Handle::default(), effect);
         world.insert_resource(table);
@@ -195,7 +199,7 @@ mod tests {
                 world.spawn(Emitter { rate, lifetime: 1000.0, ..default() });
                 run(&mut world, hz * seconds);
                 assert_eq!(emitted(&world), expected, "{rate}/s at {hz} Hz for {seconds} s");
-                let spawned = world.query::<&Sequence>().iter(&world).count() as u64;
+                let spawned = world.resource::<Particles>().len() as u64;
                 assert_eq!(spawned, expected);
             }
         }
@@ -207,7 +211,7 @@ mod tests {
         world.spawn(Emitter { rate: 40.0, ..default() });
         run(&mut world, 1);
         let mut parts: Vec<f32> =
-            world.query::<&Lifespan>().iter(&world).map(|life| life.moving_part()).collect();
+            world.resource::<Particles>().lifespans().iter().map(|life| life.moving_part()).collect();
         parts.sort_by(f32::total_cmp);
         for (part, expected) in parts.iter().zip([0.0, 0.25, 0.5, 0.75]) {
             assert!((part - expected).abs() < 1e-3, "{parts:?}");
@@ -219,7 +223,7 @@ mod tests {
         let mut world = world(60, WeatherEffect { water_mm3: 4.1887903, ..default() });
         world.spawn(Emitter { rate: 1000.0, ..default() });
         run(&mut world, 600);
-        let total: u64 = world.query::<&Volume>().iter(&world).map(|volume| u64::from(volume.0)).sum();
+        let total: u64 = world.resource::<Particles>().volumes_nl().iter().copied().map(u64::from).sum();
         let expected = f64::from(4.1887903_f32) * 1000.0 * 10_000.0;
         assert!((total as f64 - expected).abs() <= 1.0, "{total} vs {expected}");
     }
@@ -244,13 +248,8 @@ mod tests {
                 world.spawn(Emitter { rate: 60.0, stream, shape, ..default() });
             }
             run(&mut world, 5);
-            let mut found: Vec<_> = world
-                .query::<(&Sequence, &Position)>()
-                .iter(&world)
-                .map(|(sequence, position)| (*sequence, position.0.to_array()))
-                .collect();
-            found.sort_by_key(|(sequence, _)| *sequence);
-            found.into_iter().map(|(_, position)| position).collect::<Vec<_>>()
+            let particles = world.resource::<Particles>();
+            particles.positions().iter().map(|position| position.to_array()).collect::<Vec<_>>()
         };
         let alone = run_with(&[0]);
         let both = run_with(&[1, 0]);

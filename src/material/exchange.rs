@@ -11,7 +11,7 @@ use super::{
     WettingTextures,
 };
 use crate::clock::WeatheringClock;
-use crate::overlay::{Overlays, SurfaceTraces, TexelAreas, Weatherable};
+use crate::overlay::{Overlays, SurfaceTraces, TexelArea, Weatherable};
 
 /// The material a weathered entity had. Its asset may go on being edited: the weathered form follows.
 #[derive(Component, Reflect, Debug, Clone)]
@@ -20,7 +20,7 @@ pub struct DryMaterial(pub Handle<StandardMaterial>);
 
 type Surface = (
     &'static Overlays,
-    &'static TexelAreas,
+    &'static TexelArea,
     &'static SurfaceTraces,
     Option<&'static PorousMaterial>,
     Option<&'static StandingWater>,
@@ -35,14 +35,14 @@ type Edited = Or<(
     Changed<WettingTextures>,
     Changed<PlayedWetMap>,
     Changed<Overlays>,
-    Changed<TexelAreas>,
+    Changed<TexelArea>,
     Changed<SurfaceTraces>,
 )>;
 
 fn extension(
     (maps, areas, traces, porous, standing, textures, played): (
         &Overlays,
-        &TexelAreas,
+        &TexelArea,
         &SurfaceTraces,
         Option<&PorousMaterial>,
         Option<&StandingWater>,

@@ -7,7 +7,7 @@ use super::{
     BaseBrdf, Coated, Flood, PlayedWetMap, Playing, PorositySource, PorousKey, PorousMaterial, PorousUniform,
     StandingWater, TextureMeaning, WettingModel, WettingTextures,
 };
-use crate::overlay::{Overlays, SurfaceTraces, TexelAreas, Wrap};
+use crate::overlay::{Overlays, SurfaceTraces, TexelArea, Wrap};
 
 impl PorousUniform {
     /// [`Pores::sqrt_k`](super::Pores::sqrt_k).
@@ -43,7 +43,7 @@ pub(super) struct SurfaceLook<'a> {
     /// Ticks per second.
     pub(super) hz: u32,
     pub(super) maps: &'a Overlays,
-    pub(super) areas: &'a TexelAreas,
+    pub(super) areas: &'a TexelArea,
     pub(super) traces: SurfaceTraces,
 }
 

@@ -4,7 +4,7 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::splat::pack_unorm;
-use super::{Splat, TexelAreas, Weatherable};
+use super::{Splat, TexelArea, Weatherable};
 use crate::clock::WeatheringClock;
 use crate::collision::{Impact, Impacts, SurfaceCollider};
 use crate::effect::{EffectTable, WeatherEffect};
@@ -100,9 +100,8 @@ pub(crate) fn measure_texels(
     >,
 ) {
     for (entity, surface, collider, transform) in &changed {
-        let areas =
-            TexelAreas::new(collider.0.triangles(), &transform.affine(), surface.texels(), surface.wrap());
-        commands.entity(entity).insert(areas);
+        let area = TexelArea::new(collider.0.triangles(), &transform.affine(), surface.texels());
+        commands.entity(entity).insert(area);
     }
 }
 

@@ -25,8 +25,29 @@ impl RainRing {
     pub const PER_TILE: u32 = 4;
 }
 
+/// How much of the world a texel of a surface stands for.
+#[derive(Component, Debug, Clone, Copy, PartialEq)]
+pub struct TexelArea {
+    /// Mean, mm².
+    pub mean_mm2: f32,
+}
+
+impl TexelArea {
+    /// Of the triangles' area in the world and on the map; what lies on it twice counts twice, up to the whole map.
+    pub fn new(triangles: &MeshTriangles, world_from_mesh: &Affine3A, size: u32) -> Self {
+        let (mut mm2, mut maps) = (0.0, 0.0);
+        for (corners, uvs) in triangles.positions.iter().zip(&triangles.uvs) {
+            let [a, b, c] = corners.map(|corner| world_from_mesh.transform_point3(corner));
+            mm2 += f64::from((b - a).cross(c - a).length()) * 0.5e6;
+            maps += f64::from(Footprint::new(*uvs).area());
+        }
+        let texels = (maps.min(1.0) * f64::from(size * size)).max(1.0);
+        Self { mean_mm2: (mm2 / texels) as f32 }
+    }
+}
+
 /// World area that each texel of a surface stands for; 0 where no triangle lies.
-#[derive(Component, Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct TexelAreas {
     /// mm², row by row.
     pub mm2: Vec<f32>,

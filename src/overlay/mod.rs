@@ -29,7 +29,7 @@ pub(crate) use deposit::measure_texels;
 pub use deposit::{DepositPlugin, SplatQueue, SurfaceTotals, SurfaceTraces, deposit_splats};
 pub use gpu::{GpuOverlayPlugin, Overlays, SplatStats, SurfaceBatch};
 pub(crate) use maps::Footprint;
-pub use maps::{RainRing, TexelAreas};
+pub use maps::{RainRing, TexelArea, TexelAreas};
 pub use splat::Splat;
 pub use tiles::{TILE_SIZE, TileBins, TileHeader};
 

@@ -11,8 +11,8 @@ use bevy::mesh::{Indices, PrimitiveTopology};
 use bevy::prelude::*;
 use bevy::render::RenderApp;
 
-use super::{Position, Velocity};
-use crate::effect::{EffectIndex, EffectTable, ParticleLook};
+use super::Particles;
+use crate::effect::{EffectTable, ParticleLook};
 
 /// The entity whose mesh holds all particles.
 #[derive(Component, Debug, Default)]
@@ -108,13 +108,13 @@ impl Streaks {
 
 fn draw_particles(
     effects: Res<EffectTable>,
-    particles: Query<(&Position, &Velocity, &EffectIndex)>,
+    particles: Res<Particles>,
     cameras: Query<(&Camera, &GlobalTransform)>,
     mut target: Query<(&Mesh3d, &mut Visibility), With<ParticleMesh>>,
     mut meshes: ResMut<Assets<Mesh>>,
 ) {
     let Ok((mesh, mut visibility)) = target.single_mut() else { return };
-    let count = particles.iter().len();
+    let count = particles.len();
     visibility.set_if_neq(if count > 0 { Visibility::Inherited } else { Visibility::Hidden });
     if count == 0 {
         return;
@@ -122,9 +122,9 @@ fn draw_particles(
     let active = cameras.iter().find(|(camera, _)| camera.is_active);
     let eye = active.map_or(Vec3::ZERO, |(_, transform)| transform.translation());
     let mut streaks = Streaks::default();
-    for (position, velocity, effect) in &particles {
-        if let Some(effect) = effects.get(*effect) {
-            streaks.push(position.0, velocity.0, eye, &effect.look);
+    for particle in particles.iter() {
+        if let Some(effect) = effects.get(particle.effect) {
+            streaks.push(particle.position, particle.velocity, eye, &effect.look);
         }
     }
     let _ = meshes.insert(mesh.id(), streaks.into_mesh());

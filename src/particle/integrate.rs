@@ -1,11 +1,10 @@
 //! One step of motion: gravity, wind and drag.
 
-use bevy::ecs::query::QueryItem;
 use bevy::prelude::*;
 
-use super::{Forces, Lifespan, Position, Velocity};
+use super::{Forces, Particles, chunk_len, for_each_chunk};
 use crate::clock::WeatheringClock;
-use crate::effect::{EffectIndex, EffectTable};
+use crate::effect::EffectTable;
 use crate::weather::Weather;
 
 /// Numbers of an effect that motion needs: a scratch row of [`integrate_particles`].
@@ -39,10 +38,6 @@ const STANDARD_GRAVITY: f32 = 9.81;
 /// Below this many particles one thread is faster than waking others.
 const PARALLEL_BATCH: usize = 4096;
 
-/// What motion changes of a particle.
-type Moving = (&'static mut Position, &'static mut Velocity, &'static mut Lifespan, &'static EffectIndex);
-type MovingItem<'w, 's> = QueryItem<'w, 's, Moving>;
-
 /// Accelerates every particle and moves it by what is left of its tick, which is one fewer to live.
 pub fn integrate_particles(
     clock: Res<WeatheringClock>,
@@ -50,7 +45,7 @@ pub fn integrate_particles(
     weather: Res<Weather>,
     effects: Res<EffectTable>,
     mut motions: Local<Vec<Motion>>,
-    mut particles: Query<Moving>,
+    mut particles: ResMut<Particles>,
 ) {
     motions.clear();
     motions.extend(effects.rows().iter().map(|row| match &row.effect {
@@ -58,41 +53,48 @@ pub fn integrate_particles(
         None => Motion::default(),
     }));
     let (motions, wind, tick) = (motions.as_slice(), weather.wind, clock.delta_secs());
-    let step = |(mut position, mut velocity, mut lifespan, effect): MovingItem| {
-        // Change detection is for people who look at single particles; nobody pays for it here.
-        let position = position.bypass_change_detection();
-        let velocity = velocity.bypass_change_detection();
-        let lifespan = lifespan.bypass_change_detection();
-        lifespan.ticks_left = lifespan.ticks_left.saturating_sub(1);
-        let dt = tick * lifespan.moving_part();
-        velocity.0 = motions[usize::from(effect.0)].step(velocity.0, wind, dt);
-        position.0 += velocity.0 * dt;
-    };
-    if particles.iter().len() < PARALLEL_BATCH {
-        particles.iter_mut().for_each(step);
-    } else {
-        particles.par_iter_mut().batching_strategy(super::batching(PARALLEL_BATCH)).for_each(step);
-    }
+    let Particles { positions, velocities, lifespans, effects, .. } = particles.bypass_change_detection();
+    let len = chunk_len(positions.len(), PARALLEL_BATCH);
+    let columns = positions.chunks_mut(len).zip(velocities.chunks_mut(len));
+    let columns = columns.zip(lifespans.chunks_mut(len)).zip(effects.chunks(len));
+    for_each_chunk(columns, |(((positions, velocities), lifespans), effects)| {
+        let rows = positions.iter_mut().zip(velocities).zip(lifespans).zip(effects);
+        for (((position, velocity), lifespan), effect) in rows {
+            lifespan.ticks_left = lifespan.ticks_left.saturating_sub(1);
+            let dt = tick * lifespan.moving_part();
+            *velocity = motions[usize::from(effect.0)].step(*velocity, wind, dt);
+            *position += *velocity * dt;
+        }
+    });
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Lifespan, Particle, Sequence};
     use super::*;
-    use crate::effect::WeatherEffect;
+    use crate::effect::{EffectIndex, WeatherEffect};
 
     fn world_with(effect: WeatherEffect, forces: Forces) -> (World, EffectIndex) {
         let mut world = World::new();
         world.insert_resource(WeatheringClock::new(60));
         world.insert_resource(forces);
         world.init_resource::<Weather>();
+        world.init_resource::<Particles>();
         let mut table = EffectTable::default();
         let index = table.insert(Handle::default(), effect).unwrap();
         world.insert_resource(table);
         (world, index)
     }
 
-    fn particle(velocity: Vec3, effect: EffectIndex, born_at: u16) -> impl Bundle {
-        (Position(Vec3::ZERO), Velocity(velocity), Lifespan { ticks_left: 9, born_at }, effect)
+    fn spawn(world: &mut World, velocity: Vec3, effect: EffectIndex, born_at: u16) {
+        let lifespan = Lifespan { ticks_left: 9, born_at };
+        let (position, sequence) = (Vec3::ZERO, Sequence(0));
+        let particle = Particle { position, velocity, lifespan, volume_nl: 1, sequence, effect };
+        world.resource_mut::<Particles>().spawn([particle].into_iter());
+    }
+
+    fn velocity(world: &World) -> Vec3 {
+        world.resource::<Particles>().velocities()[0]
     }
 
     fn run(world: &mut World, ticks: usize) {
@@ -108,9 +110,9 @@ mod tests {
     fn falls_to_terminal_speed_and_no_faster() {
         let effect = WeatherEffect { terminal_speed: 6.55, ..default() };
         let (mut world, index) = world_with(effect, Forces::default());
-        let drop = world.spawn(particle(Vec3::ZERO, index, 0)).id();
+        spawn(&mut world, Vec3::ZERO, index, 0);
         run(&mut world, 600);
-        let speed = world.get::<Velocity>(drop).unwrap().0.length();
+        let speed = velocity(&world).length();
         assert!((speed - 6.55).abs() < 0.01, "{speed}");
     }
 
@@ -119,9 +121,9 @@ mod tests {
         let effect = WeatherEffect { terminal_speed: 0.0, ..default() };
         let (mut world, index) = world_with(effect, Forces::default());
         world.resource_mut::<Weather>().wind = Vec3::X * 50.0;
-        let stone = world.spawn(particle(Vec3::ZERO, index, 0)).id();
+        spawn(&mut world, Vec3::ZERO, index, 0);
         run(&mut world, 60);
-        let velocity = world.get::<Velocity>(stone).unwrap().0;
+        let velocity = velocity(&world);
         assert!((velocity - Vec3::new(0.0, -9.81, 0.0)).length() < 1e-3, "{velocity}");
     }
 
@@ -130,9 +132,9 @@ mod tests {
         let effect = WeatherEffect { terminal_speed: 0.05, ..default() };
         let (mut world, index) = world_with(effect, Forces::default());
         world.resource_mut::<Weather>().wind = Vec3::X * 30.0;
-        let dust = world.spawn(particle(Vec3::ZERO, index, 0)).id();
+        spawn(&mut world, Vec3::ZERO, index, 0);
         run(&mut world, 120);
-        let velocity = world.get::<Velocity>(dust).unwrap().0;
+        let velocity = velocity(&world);
         assert!(velocity.x > 29.0 && velocity.x <= 30.0, "{velocity}");
     }
 
@@ -140,9 +142,9 @@ mod tests {
     fn a_particle_born_within_the_tick_moves_only_the_rest_of_it() {
         let effect = WeatherEffect { terminal_speed: 0.0, gravity_scale: 0.0, ..default() };
         let (mut world, index) = world_with(effect, Forces::default());
-        let late = world.spawn(particle(Vec3::X * 60.0, index, 0x4000)).id();
+        spawn(&mut world, Vec3::X * 60.0, index, 0x4000);
         run(&mut world, 1);
-        let moved = world.get::<Position>(late).unwrap().0.x;
+        let moved = world.resource::<Particles>().positions()[0].x;
         assert!((moved - 0.75).abs() < 1e-5, "{moved}");
     }
 

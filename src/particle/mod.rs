@@ -1,21 +1,22 @@
-//! Particles: entities of small plain components, in one archetype, by the hundred thousand.
+//! Particles: a structure of arrays, by the hundred thousand.
 //!
-//! A particle has no `Transform` and no children; it lives in table storage as columns of numbers and is spawned
-//! and retired in batches. One tick moves it by the forces of its [effect](crate::effect); the segment it moved
-//! is what [collision](crate::collision) casts. [`Velocity`] is constant over a tick, so the segment's start is
-//! not stored: it is [`swept_start`].
+//! Particles are no entities: they live in the columns of one resource, [`Particles`], are born at its end and leave it by
+//! being overwritten with the last. One tick moves them by the forces of their [effect](crate::effect); the segment each
+//! moved is what [collision](crate::collision) casts. Velocity is constant over a tick, so the segment's start is not
+//! stored: it is [`swept_start`].
 //!
 //! | column | bytes |
 //! |---|---|
-//! | [`Position`] | 12 |
-//! | [`Velocity`] | 12 |
+//! | position | 12 |
+//! | velocity | 12 |
 //! | [`Lifespan`] | 4 |
-//! | [`Volume`] | 4 |
+//! | volume | 4 |
 //! | [`Sequence`] | 4 |
 //! | [`EffectIndex`] | 2 |
 
 mod draw;
 mod integrate;
+mod pool;
 mod retire;
 
 use bevy::prelude::*;
@@ -27,19 +28,12 @@ use crate::weather::Weather;
 
 pub use draw::{ParticleDrawPlugin, ParticleMesh};
 pub use integrate::integrate_particles;
-pub use retire::{Retired, collect_dead, retire_particles};
-
-/// Where a particle is at the end of the tick; metres, world space.
-#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
-#[component(storage = "Table")]
-pub struct Position(pub Vec3);
-
-/// Velocity during the tick; m/s.
-#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
-pub struct Velocity(pub Vec3);
+pub use pool::{Particle, Particles};
+pub(crate) use pool::{SavedParticle, chunk_len, for_each_chunk};
+pub use retire::retire_particles;
 
 /// How long a particle has left, and when within its first tick it was born.
-#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Lifespan {
     /// Ticks until it expires; at most [`Self::MAX_TICKS`].
     pub ticks_left: u16,
@@ -47,65 +41,9 @@ pub struct Lifespan {
     pub born_at: u16,
 }
 
-/// Water the particle carries; nanolitres, so that sums are exact.
-#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Volume(pub u32);
-
 /// A number no other living particle has. Gives impacts one order, whatever the threads do.
-#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Sequence(pub u32);
-
-/// Everything a particle is.
-pub type ParticleBundle = (Position, Velocity, Lifespan, Volume, Sequence, EffectIndex);
-
-/// A particle in a file. Floats as their bits, so that nothing depends on how they are written.
-#[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct SavedParticle {
-    position: [u32; 3],
-    velocity: [u32; 3],
-    ticks_left: u16,
-    born_at: u16,
-    volume_nl: u32,
-    pub(crate) sequence: u32,
-    effect: u16,
-}
-
-impl From<ParticleBundle> for SavedParticle {
-    fn from((position, velocity, lifespan, volume, sequence, effect): ParticleBundle) -> Self {
-        let bits = |vector: Vec3| vector.to_array().map(f32::to_bits);
-        Self {
-            position: bits(position.0),
-            velocity: bits(velocity.0),
-            ticks_left: lifespan.ticks_left,
-            born_at: lifespan.born_at,
-            volume_nl: volume.0,
-            sequence: sequence.0,
-            effect: effect.0,
-        }
-    }
-}
-
-impl From<SavedParticle> for ParticleBundle {
-    fn from(saved: SavedParticle) -> Self {
-        let vector = |bits: [u32; 3]| Vec3::from_array(bits.map(f32::from_bits));
-        (
-            Position(vector(saved.position)),
-            Velocity(vector(saved.velocity)),
-            Lifespan { ticks_left: saved.ticks_left, born_at: saved.born_at },
-            Volume(saved.volume_nl),
-            Sequence(saved.sequence),
-            EffectIndex(saved.effect),
-        )
-    }
-}
-
-/// Bytes of component data per particle.
-pub const BYTES_PER_PARTICLE: usize = size_of::<Position>()
-    + size_of::<Velocity>()
-    + size_of::<Lifespan>()
-    + size_of::<Volume>()
-    + size_of::<Sequence>()
-    + size_of::<EffectIndex>();
 
 impl Lifespan {
     /// The longest life: 18 minutes at 60 ticks a second.
@@ -180,12 +118,12 @@ pub struct WaterCounts {
 }
 
 impl WaterCounts {
-    fn expire(&mut self, effect: EffectIndex, volume: Volume) {
+    fn expire(&mut self, effect: EffectIndex, volume_nl: u32) {
         let row = usize::from(effect.0);
         if self.expired_nl.len() <= row {
             self.expired_nl.resize(row + 1, 0);
         }
-        self.expired_nl[row] += u64::from(volume.0);
+        self.expired_nl[row] += u64::from(volume_nl);
     }
 }
 
@@ -214,18 +152,13 @@ impl Plugin for ParticlePlugin {
             .init_resource::<ParticleConfig>()
             .init_resource::<ParticleCounts>()
             .init_resource::<WaterCounts>()
-            .init_resource::<Retired>()
+            .init_resource::<Particles>()
             .add_systems(
                 WeatheringTick,
                 (
                     integrate_particles.in_set(WeatheringSystems::Integrate),
-                    (collect_dead, retire_particles).chain().in_set(RetireParticles),
+                    retire_particles.in_set(RetireParticles),
                 ),
             );
     }
-}
-
-/// How loops over all particles are split: a batch below `min` particles is not worth a thread.
-pub(crate) fn batching(min: usize) -> bevy::ecs::batching::BatchingStrategy {
-    bevy::ecs::batching::BatchingStrategy::new().min_batch_size(min)
 }

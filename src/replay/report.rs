@@ -8,7 +8,7 @@ use crate::clock::WeatheringClock;
 use crate::collision::ColliderReport;
 use crate::emitter::{EmissionSeed, NewParticles};
 use crate::overlay::SurfaceTotals;
-use crate::particle::{ParticleCounts, Volume, WaterCounts};
+use crate::particle::{ParticleCounts, Particles, WaterCounts};
 use crate::scenario::{Digest, ScenarioSurface, amounts_digest};
 use crate::wetting::{DripEffect, WettingStats};
 
@@ -182,7 +182,7 @@ fn water_report(world: &mut World, maps: &[SurfaceMaps]) -> WaterReport {
     let sum = |of: &dyn Fn(&SurfaceMaps) -> u64| -> f64 {
         maps.iter().map(|maps| maps.water.units().mm3(of(maps))).sum::<f64>() + 0.0
     };
-    let flying: u64 = world.query::<&Volume>().iter(world).map(|volume| u64::from(volume.0)).sum();
+    let flying: u64 = world.resource::<Particles>().volumes_nl().iter().copied().map(u64::from).sum();
     let in_flight = flying + world.resource::<NewParticles>().waiting_nl();
     let counts = world.resource::<WaterCounts>();
     let drips = world.get_resource::<DripEffect>().and_then(|drips| drips.index).map(|index| index.0);

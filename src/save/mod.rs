@@ -25,12 +25,9 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::clock::WeatheringClock;
-use crate::effect::EffectIndex;
 use crate::emitter::{Emitter, EmitterState, NewParticles};
 use crate::overlay::{SurfaceTotals, SurfaceTraces};
-use crate::particle::{
-    Lifespan, ParticleCounts, Position, SavedParticle, Sequence, Velocity, Volume, WaterCounts,
-};
+use crate::particle::{ParticleCounts, Particles, SavedParticle, WaterCounts};
 use crate::scenario::{Digest, ScenarioSurface};
 use crate::weather::{DryingClock, DryingPoint, Weather};
 use crate::wetting::{Ledger, SurfaceWater};
@@ -122,13 +119,8 @@ impl SavedScene {
     /// Takes the state of a scenario. `scenario`: its file, as it was read; `colors`: the colour maps of its surfaces, in
     /// its order.
     pub fn capture(world: &mut World, scenario: &[u8], seed: u64, colors: Vec<ColorMaps>) -> Self {
-        let mut flying = world.query::<(&Position, &Velocity, &Lifespan, &Volume, &Sequence, &EffectIndex)>();
-        let mut particles: Vec<SavedParticle> = flying
-            .iter(world)
-            .map(|(&position, &velocity, &lifespan, &volume, &sequence, &effect)| {
-                (position, velocity, lifespan, volume, sequence, effect).into()
-            })
-            .collect();
+        let mut particles: Vec<SavedParticle> =
+            world.resource::<Particles>().iter().map(SavedParticle::from).collect();
         particles.sort_unstable_by_key(|particle| particle.sequence);
         let emitters = emitters_in_order(world)
             .into_iter()

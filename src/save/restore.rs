@@ -8,9 +8,10 @@ use bevy::prelude::*;
 use super::maps::value;
 use super::{SaveError, SavedScene, emitters_in_order, surfaces_in_order};
 use crate::clock::WeatheringClock;
+use crate::effect::EffectTable;
 use crate::emitter::{EmitterState, NewParticles};
 use crate::overlay::{CpuMaps, Overlays, SurfaceTotals, SurfaceTraces, Weatherable};
-use crate::particle::ParticleBundle;
+use crate::particle::Particles;
 use crate::scenario::Digest;
 use crate::weather::DryingClock;
 use crate::wetting::SurfaceWater;
@@ -57,9 +58,20 @@ impl SavedScene {
         if clock.hz() != state.hz {
             return Err(value(&path, "hz", state.hz, clock.hz().to_string()));
         }
-        let Some(drying) = DryingClock::from_points(state.drying.clone()) else {
-            return Err(value(&path, "drying", "out of order", "in order of ticks, and finite".into()));
+        let drying = DryingClock::from_points(state.drying.clone());
+        let Some(drying) =
+            drying.filter(|drying| drying.points().iter().all(|point| point.tick <= state.tick))
+        else {
+            let expected = "in order of ticks, none in the future, and finite".into();
+            return Err(value(&path, "drying", "out of order", expected));
         };
+        let effects = world.resource::<EffectTable>().rows().len();
+        let saved = state.particles.iter().chain(&state.waiting);
+        if let Some(effect) =
+            saved.map(|particle| usize::from(particle.effect)).find(|&effect| effect >= effects)
+        {
+            return Err(value(&path, "effect of a particle", effect, format!("below {effects}")));
+        }
 
         world.insert_resource(drying);
         world.insert_resource(state.weather);
@@ -72,8 +84,9 @@ impl SavedScene {
                 *state = emitter.clone();
             }
         }
-        let particles: Vec<ParticleBundle> = state.particles.iter().map(|&saved| saved.into()).collect();
-        world.spawn_batch(particles);
+        let mut particles = world.resource_mut::<Particles>();
+        particles.clear();
+        particles.spawn(state.particles.iter().map(|&saved| saved.into()));
         let waiting = state.waiting.iter().map(|&saved| saved.into()).collect();
         world.resource_mut::<NewParticles>().restore(waiting, state.next_sequence);
         for (index, (entity, _)) in surfaces.into_iter().enumerate() {
@@ -94,9 +107,7 @@ impl SavedScene {
             *traces = state.traces;
         }
         if let Some(mut water) = world.get_mut::<SurfaceWater>(entity) {
-            let (wrap, generation) = (water.wrap, water.generation + 1);
-            *water = saved.water.clone();
-            (water.wrap, water.generation) = (wrap, generation);
+            *water = SurfaceWater { wrap: water.wrap, ..saved.water.clone() };
         }
         if let Some(mut overlays) = world.get::<Overlays>(entity).cloned() {
             let mut images = world.resource_mut::<Assets<Image>>();

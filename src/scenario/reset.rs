@@ -6,17 +6,14 @@ use super::Digest;
 use crate::clock::WeatheringClock;
 use crate::emitter::{Emitter, EmitterState, NewParticles};
 use crate::overlay::{CpuMaps, SplatQueue, SurfaceTotals, Weatherable};
-use crate::particle::{Lifespan, ParticleCounts, WaterCounts};
+use crate::particle::{ParticleCounts, Particles, WaterCounts};
 use crate::weather::DryingClock;
 use crate::wetting::{DropQueue, SurfaceWater};
 
 /// Takes a scenario back to tick 0: dry surfaces, no particles, the same random streams. What follows is what
 /// followed the first time.
 pub fn reset_scenario(world: &mut World) {
-    let mut particles = world.query_filtered::<Entity, With<Lifespan>>();
-    for particle in particles.iter(world).collect::<Vec<_>>() {
-        world.despawn(particle);
-    }
+    world.resource_mut::<Particles>().clear();
     let mut emitters = world.query_filtered::<&mut EmitterState, With<Emitter>>();
     for mut state in emitters.iter_mut(world) {
         *state = EmitterState::default();

@@ -15,7 +15,7 @@ use crate::collision::{BuildColliders, MeshColliders, NotWeatherable, SurfaceCol
 use crate::effect::{EffectTable, WeatherEffect};
 use crate::emitter::{EmissionSeed, Emitter};
 use crate::material::{PlayedWetMap, Playing};
-use crate::overlay::TexelAreas;
+use crate::overlay::TexelArea;
 use crate::particle::{Forces, ParticleConfig};
 use crate::schedule::{WeatheringSystems, WeatheringTick};
 use crate::wetting::{self, ExposureProgress, MeasureSurfaces};
@@ -234,7 +234,7 @@ fn watch_loading(
         (),
         (
             With<ScenarioSurface>,
-            Or<(Without<SurfaceCollider>, Without<TexelAreas>, Without<wetting::Exposure>)>,
+            Or<(Without<SurfaceCollider>, Without<TexelArea>, Without<wetting::Exposure>)>,
         ),
     >,
     exposure: Res<ExposureProgress>,

@@ -64,7 +64,9 @@ impl DryingClock {
     pub fn change(&mut self, weather: &Weather, tick: u32, hz: u32) -> bool {
         let hourly = weather.demand_mm_per_h();
         let ticks = 3600.0 * f64::from(hz);
-        let per_tick = Demand { air_mm: hourly.air_mm / ticks, sun_mm: hourly.sun_mm / ticks };
+        // Nonsense would stay in the sums for ever.
+        let sound = |rate: f64| if rate.is_finite() { rate / ticks } else { 0.0 };
+        let per_tick = Demand { air_mm: sound(hourly.air_mm), sun_mm: sound(hourly.sun_mm) };
         let point = DryingPoint { tick, total: self.until(tick), per_tick };
         let count = self.points.len();
         match self.points.last_mut() {
@@ -141,6 +143,15 @@ mod tests {
         assert_eq!(clock.until(36_000), hour);
         assert_eq!(clock.until(18_000).air_mm, hour.air_mm / 2.0);
         assert!((clock.until(72_000).air_mm - 4.0 * hourly.air_mm).abs() < 1e-12);
+    }
+
+    #[test]
+    fn nonsense_dries_nothing_and_does_not_stay() {
+        let mut clock = DryingClock::default();
+        assert!(clock.change(&Weather { wind: Vec3::ZERO.normalize() * 3.0, ..weather(1.0) }, 0, 10));
+        assert!(clock.change(&weather(1.0), 36_000, 10));
+        let hourly = weather(1.0).demand_mm_per_h();
+        assert!((clock.until(72_000).air_mm - hourly.air_mm).abs() < 1e-9, "{:?}", clock.until(72_000));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::clock::WeatheringClock;
 use crate::collision::{MeshTriangles, SurfaceCollider};
 use crate::effect::{EffectIndex, EffectTable, WeatherEffect};
 use crate::emitter::NewParticles;
-use crate::particle::{Lifespan, Position, Sequence, Velocity, Volume};
+use crate::particle::{Lifespan, Particle};
 
 /// A drop that is about to fall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,15 +78,13 @@ pub(super) fn shed_drips(
         let Ok((_, mut drips, geometry, collider, transform)) = surfaces.get_mut(entity) else { continue };
         for drip in drips.0.drain(..) {
             let start = start_of(&drip, &geometry.0, collider.0.triangles(), &transform.affine());
-            new.push(|number| {
-                (
-                    Position(start),
-                    Velocity(Vec3::ZERO),
-                    Lifespan { ticks_left, born_at: 0 },
-                    Volume(drip.water_nl),
-                    Sequence(number),
-                    index,
-                )
+            new.push(|sequence| Particle {
+                position: start,
+                velocity: Vec3::ZERO,
+                lifespan: Lifespan { ticks_left, born_at: 0 },
+                volume_nl: drip.water_nl,
+                sequence,
+                effect: index,
             });
         }
     }

@@ -57,15 +57,14 @@ impl Exposure {
         let size = job.size;
         let points = surface_points(job.bvh.triangles(), &job.world_from_mesh, size, job.wrap);
         let cells = Self::CELLS.min(size);
+        let cell = |at: u32| at * cells / size;
+        let cell_of = |texel: u32| (cell(texel / size) * cells + cell(texel % size)) as usize;
+        // How far off the middle of its cell a texel's is, along an axis, in parts of 1 / (2 cells size).
+        let off_middle = |at: u32| ((2 * at + 1) * cells).abs_diff((2 * cell(at) + 1) * size);
         // The point of each cell that is nearest to its middle.
-        let side = size / cells;
-        let cell_of = |texel: u32| {
-            ((texel / size / side).min(cells - 1) * cells + (texel % size / side).min(cells - 1)) as usize
-        };
         let mut chosen: Vec<Option<(u32, usize)>> = vec![None; (cells * cells) as usize];
         for (number, point) in points.iter().enumerate() {
-            let (x, y) = (point.texel % size % side, point.texel / size % side);
-            let off = x.abs_diff(side / 2) + y.abs_diff(side / 2);
+            let off = off_middle(point.texel % size) + off_middle(point.texel / size);
             let cell = &mut chosen[cell_of(point.texel)];
             if cell.is_none_or(|(least, _)| off < least) {
                 *cell = Some((off, number));
@@ -87,7 +86,7 @@ impl Exposure {
         };
         for y in 0..size {
             for x in 0..size {
-                let [open, lit] = between_cells(&grid, cells, side, job.wrap, x, y);
+                let [open, lit] = between_cells(&grid, cells, size, job.wrap, x, y);
                 // A free plane, which sees half of everything, gets 1.
                 let air = 0.35 + 0.65 * open;
                 exposure.air.push((air * 128.0).round().clamp(1.0, 255.0) as u8);
@@ -127,9 +126,9 @@ fn dilated(mut grid: Vec<Option<[f32; 2]>>, side: usize, wrap: [Wrap; 2]) -> Vec
 }
 
 /// Bilinear between the middles of cells.
-fn between_cells(grid: &[[f32; 2]], cells: u32, side: u32, wrap: [Wrap; 2], x: u32, y: u32) -> [f32; 2] {
+fn between_cells(grid: &[[f32; 2]], cells: u32, size: u32, wrap: [Wrap; 2], x: u32, y: u32) -> [f32; 2] {
     let place = |texel: u32, wrap: Wrap| {
-        let at = (texel as f32 + 0.5) / side as f32 - 0.5;
+        let at = (texel as f32 + 0.5) * cells as f32 / size as f32 - 0.5;
         let low = at.floor() as i32;
         let inside = |cell: i32| match wrap {
             Wrap::Repeat => cell.rem_euclid(cells as i32) as u32,
@@ -188,7 +187,7 @@ pub(super) fn bake_exposure(
     weather: Res<Weather>,
     colliders: Res<MeshColliders>,
     mut progress: ResMut<ExposureProgress>,
-    unmeasured: Query<(), (With<Weatherable>, Without<WetGeometry>, Without<NotWeatherable>)>,
+    unmeasured: Query<(), (With<Weatherable>, With<Mesh3d>, Without<WetGeometry>, Without<NotWeatherable>)>,
     mut surfaces: Query<Exposed>,
 ) {
     if let Some(task) = &mut progress.task {
@@ -249,4 +248,25 @@ pub(super) fn bake_exposure(
         };
         jobs.into_iter().map(bake).collect()
     }));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_lie_where_their_texels_do_whatever_the_size_of_the_map() {
+        for size in [64, 96, 128, 256, 512, 1024] {
+            let cells = Exposure::CELLS.min(size);
+            let ramp: Vec<[f32; 2]> =
+                (0..cells * cells).map(|cell| [(cell % cells) as f32, (cell / cells) as f32]).collect();
+            // But for the outermost cells, which mix with those across the edge.
+            for texel in size / cells..size - size.div_ceil(cells) {
+                let [x, y] = between_cells(&ramp, cells, size, [Wrap::Repeat; 2], texel, size / 2);
+                let at = |texel: u32| (texel as f32 + 0.5) * cells as f32 / size as f32 - 0.5;
+                assert!((x - at(texel)).abs() < 1e-3, "{size} {texel}: {x}");
+                assert!((y - at(size / 2)).abs() < 1e-3, "{size} {texel}: {y}");
+            }
+        }
+    }
 }

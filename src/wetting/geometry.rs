@@ -2,6 +2,7 @@
 
 use bevy::math::{Affine3A, DVec2, Vec2, Vec3};
 
+use super::Units;
 use super::finder::Finder;
 use super::grid::Grid;
 use super::gutters::Gutters;
@@ -181,8 +182,8 @@ impl TexelGeometry {
         let [a, b, c] = triangles.positions[owner].map(|corner| world_from_mesh.transform_point3(corner));
         let [uv_a, uv_b, uv_c] = triangles.uvs[owner];
         let middle = Vec2::new((texel % self.size) as f32 + 0.5, (texel / self.size) as f32 + 0.5);
-        let center = (uv_a + uv_b + uv_c) / 3.0;
-        // The copy of the map that the triangle lies in.
+        // The copy of the map that the triangle lies in: its points are nearer to the middle of its box than to any other's.
+        let center = (uv_a.min(uv_b).min(uv_c) + uv_a.max(uv_b).max(uv_c)) / 2.0;
         let uv = middle / self.size as f32;
         let uv = uv + (center - uv).round();
         let (ab, ac, at) = (uv_b - uv_a, uv_c - uv_a, uv - uv_a);
@@ -192,6 +193,12 @@ impl TexelGeometry {
         let normal =
             (b - a).cross(c - a).normalize_or(Vec3::Y) * world_from_mesh.matrix3.determinant().signum();
         Some((a + (b - a) * to_b + (c - a) * to_c, normal))
+    }
+
+    /// Depth of a unit on a texel, mm. Where nothing lies, a texel counts as one of mean size.
+    pub fn unit_mm(&self, units: Units, texel: u32) -> f64 {
+        let area = self.area_mm2[texel as usize];
+        units.mm_on(if area > 0.0 { area } else { self.mean_mm2 }.max(1e-6))
     }
 
     /// Memory held, bytes.
@@ -296,6 +303,19 @@ mod tests {
                     let point = points.next_if(|point| point.texel == texel);
                     assert_eq!(point.map(|point| point.triangle), owner);
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn points_lie_under_their_texels_on_an_undivided_square_too() {
+        for (cells, tile) in [(1, Vec2::ZERO), (1, Vec2::new(2.0, -1.0)), (3, Vec2::ZERO)] {
+            let mesh = sheet(cells, floor, |point| point + tile);
+            let geometry = TexelGeometry::new(&mesh, &Affine3A::IDENTITY, Vec3::Y, 32, REPEAT);
+            for texel in 0..32 * 32 {
+                let (point, _) = geometry.point(texel, &mesh, &Affine3A::IDENTITY).unwrap();
+                let expected = Vec3::new((texel % 32) as f32 + 0.5, 0.0, (texel / 32) as f32 + 0.5) / 32.0;
+                assert!((point - expected).length() < 1e-4, "{texel}: {point} {expected}");
             }
         }
     }

@@ -18,8 +18,8 @@ use bevy::render::{ExtractSchedule, MainWorld, Render, RenderApp, RenderSystems}
 use bytemuck::{Pod, Zeroable};
 use half::f16;
 
-use super::surface::Tiles;
-use super::{Exposure, Marks, SurfaceWater, Units, WetGeometry};
+use super::surface::{Tiles, texel_in};
+use super::{Exposure, Marks, SurfaceWater, WetGeometry};
 use crate::overlay::{Overlays, TILE_SIZE};
 
 /// A texel as the shader reads it: `TexelWater` in `shaders/common/wet_map.wgsl` has the same fields.
@@ -144,15 +144,11 @@ fn pack_tile(
     tile: u32,
     texels: &mut Vec<GpuTexelWater>,
 ) {
-    let across = water.size / TILE_SIZE;
-    let origin = (tile / across * TILE_SIZE) * water.size + tile % across * TILE_SIZE;
-    for y in 0..TILE_SIZE {
-        for x in 0..TILE_SIZE {
-            let texel = origin + y * water.size + x;
-            let shown = geometry.gutter_source(texel).unwrap_or(texel);
-            texels.push(pack_texel(water, geometry, exposure, shown));
-        }
-    }
+    texels.extend((0..(TILE_SIZE * TILE_SIZE) as usize).map(|local| {
+        let texel = texel_in(water.size, tile, local);
+        let shown = geometry.gutter_source(texel).unwrap_or(texel);
+        pack_texel(water, geometry, exposure, shown)
+    }));
 }
 
 /// A texel as it is drawn.
@@ -170,8 +166,7 @@ pub(super) fn pack_texel(
     if state.is_dry() {
         return GpuTexelWater { marks, ..default() };
     }
-    let area = geometry.area_mm2()[texel as usize];
-    let unit_mm = Units::mm_on(water.units, if area > 0.0 { area } else { geometry.mean_mm2().max(1e-6) });
+    let unit_mm = geometry.unit_mm(water.units, texel);
     let depth = |units: u32| u32::from(f16::from_f64((f64::from(units) * unit_mm).min(60_000.0)).to_bits());
     let [air, sun] = exposure.map_or(Exposure::FREE, |exposure| exposure.bytes_at(texel));
     GpuTexelWater {

@@ -89,7 +89,7 @@ impl Plugin for WettingPlugin {
             .add_observer(prepare::release_surface)
             .add_systems(
                 PreUpdate,
-                (prepare::measure_surfaces, exposure::bake_exposure)
+                (prepare::settle_before_new_material, prepare::measure_surfaces, exposure::bake_exposure)
                     .chain()
                     .in_set(MeasureSurfaces)
                     .after(crate::collision::BuildColliders)

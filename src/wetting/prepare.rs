@@ -6,9 +6,12 @@ use bevy::math::Mat3A;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
-use super::{Dripping, DropQueue, Exposure, SurfaceWater, TexelGeometry};
+use super::{Dripping, DropQueue, Exposure, Now, SurfaceWater, TexelGeometry};
+use crate::clock::WeatheringClock;
 use crate::collision::{MeshBvh, SurfaceCollider};
-use crate::overlay::{TexelAreas, Weatherable, Wrap};
+use crate::material::PorousMaterial;
+use crate::overlay::{TexelArea, Weatherable, Wrap};
+use crate::weather::DryingClock;
 
 /// The shape of a surface's texels, and which lie beside each other. Comes some frames after its collider.
 #[derive(Component, Clone)]
@@ -22,6 +25,8 @@ pub(super) struct Measured {
     bvh: Arc<MeshBvh>,
     /// Turn and scale; where it stands does not matter.
     matrix: Mat3A,
+    /// It is another mesh, or another map, than before.
+    reshaped: bool,
     /// A change may have come while it was being measured.
     late: bool,
     task: Option<Task<TexelGeometry>>,
@@ -50,15 +55,24 @@ type Measurable = (
     Entity,
     Ref<'static, Weatherable>,
     Ref<'static, SurfaceCollider>,
-    &'static TexelAreas,
+    &'static TexelArea,
     Ref<'static, GlobalTransform>,
     Option<&'static mut Measured>,
     Option<&'static mut SurfaceWater>,
+    Past,
 );
 
+/// By what the water of a surface has dried until now.
+type Past = (Option<&'static WetGeometry>, Option<&'static Exposure>, Option<&'static PorousMaterial>);
+
 /// Measures new surfaces, and those that change their shape, map size or how they stand.
-pub(super) fn measure_surfaces(mut commands: Commands, mut surfaces: Query<Measurable>) {
-    for (entity, surface, collider, areas, transform, mut measured, mut water) in &mut surfaces {
+pub(super) fn measure_surfaces(
+    mut commands: Commands,
+    clock: Res<WeatheringClock>,
+    drying: Res<DryingClock>,
+    mut surfaces: Query<Measurable>,
+) {
+    for (entity, surface, collider, texel, transform, mut measured, mut water, past) in &mut surfaces {
         let changed = surface.is_changed() || collider.is_changed() || transform.is_changed();
         // What is being measured is finished first: a surface that keeps turning is measured as fast as that goes.
         let stale = match &measured {
@@ -72,9 +86,7 @@ pub(super) fn measure_surfaces(mut commands: Commands, mut surfaces: Query<Measu
                 && (water.size, water.wrap) != (size, wrap)
             {
                 // What was on the old maps is gone with them.
-                let generation = water.generation + 1;
-                **water = SurfaceWater::new(&surface, areas.mean_mm2);
-                water.generation = generation;
+                **water = SurfaceWater::new(&surface, texel.mean_mm2);
                 commands.entity(entity).remove::<(WetGeometry, Exposure)>();
             }
             let (affine, bvh) = (transform.affine(), collider.0.clone());
@@ -83,7 +95,10 @@ pub(super) fn measure_surfaces(mut commands: Commands, mut surfaces: Query<Measu
                 TexelGeometry::new(triangles.triangles(), &affine, Vec3::Y, size, wrap)
             });
             let matrix = affine.matrix3;
-            let measured = Measured { size, wrap, bvh, matrix, late: false, task: Some(task) };
+            let reshaped = measured
+                .as_ref()
+                .is_none_or(|old| (old.size, old.wrap) != (size, wrap) || !Arc::ptr_eq(&old.bvh, &bvh));
+            let measured = Measured { size, wrap, bvh, matrix, reshaped, late: false, task: Some(task) };
             commands.entity(entity).insert(measured);
             continue;
         }
@@ -100,17 +115,65 @@ pub(super) fn measure_surfaces(mut commands: Commands, mut surfaces: Query<Measu
         if geometry.size() != size || measured.wrap != wrap || !Arc::ptr_eq(&measured.bvh, &collider.0) {
             continue;
         }
+        if let (Some(water), (Some(old), exposure, material)) = (&mut water, past)
+            && water.is_wet()
+        {
+            // What has dried until now has dried by the old one.
+            let material = material.copied().unwrap_or_default();
+            water.settle_all(&Now::new(clock.tick(), clock.hz(), &drying, &old.0, exposure, &material));
+        }
         let mut entity = commands.entity(entity);
-        entity.insert(WetGeometry(Arc::new(geometry))).remove::<Exposure>();
+        entity.insert(WetGeometry(Arc::new(geometry)));
+        if measured.reshaped {
+            entity.remove::<Exposure>();
+        }
         if water.is_none() {
-            entity.insert(SurfaceWater::new(&surface, areas.mean_mm2));
+            entity.insert(SurfaceWater::new(&surface, texel.mean_mm2));
+        }
+    }
+}
+
+/// What a surface was made of when its texels were last brought to the present for another.
+#[derive(Component)]
+pub(super) struct FormerMaterial(PorousMaterial);
+
+type Remade = (
+    Entity,
+    &'static mut SurfaceWater,
+    &'static WetGeometry,
+    Option<&'static Exposure>,
+    Ref<'static, PorousMaterial>,
+    Option<&'static mut FormerMaterial>,
+);
+
+/// Water of a surface that becomes other matter has been absorbed and dried, until now, as in the former.
+pub(super) fn settle_before_new_material(
+    mut commands: Commands,
+    clock: Res<WeatheringClock>,
+    drying: Res<DryingClock>,
+    mut surfaces: Query<Remade, Changed<PorousMaterial>>,
+) {
+    for (entity, mut water, geometry, exposure, material, former) in &mut surfaces {
+        let Some(mut former) = former else {
+            commands.entity(entity).insert(FormerMaterial(*material));
+            continue;
+        };
+        let former = std::mem::replace(&mut former.0, *material);
+        if former != *material && water.is_wet() {
+            water.settle_all(&Now::new(clock.tick(), clock.hz(), &drying, &geometry.0, exposure, &former));
         }
     }
 }
 
 /// A surface that is not [`Weatherable`] any more is not wet any more.
 pub(super) fn release_surface(removed: On<Remove, Weatherable>, mut commands: Commands) {
-    commands
-        .entity(removed.entity)
-        .try_remove::<(WetGeometry, Measured, SurfaceWater, Exposure, DropQueue, Dripping)>();
+    commands.entity(removed.entity).try_remove::<(
+        WetGeometry,
+        Measured,
+        SurfaceWater,
+        Exposure,
+        FormerMaterial,
+        DropQueue,
+        Dripping,
+    )>();
 }

@@ -119,7 +119,8 @@ impl WetnessQuery<'_, '_> {
         let default = PorousMaterial::default();
         let material = material.unwrap_or(&default);
         let now = self.now(geometry, exposure, material);
-        Some(wetness_of(water, &now, texel))
+        // As with drops: what fell beside an island is on the texel that stands in for it.
+        Some(wetness_of(water, &now, geometry.0.stand_in(texel).unwrap_or(texel)))
     }
 }
 

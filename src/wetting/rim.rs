@@ -5,7 +5,7 @@
 //! its pores dry. Measured once after each shower. The amounts stay as they are, so nothing is seen of it at that moment.
 
 use super::geometry::{Link, Side};
-use super::surface::{Now, SurfaceWater};
+use super::surface::{Now, SurfaceWater, Tiles};
 
 /// Steps from the rim to where a texel no longer knows of it.
 pub const REACH: u32 = 24;
@@ -82,16 +82,18 @@ pub(crate) fn measure_rims(water: &mut SurfaceWater, now: &Now, scratch: &mut Ri
     }
     for texel in 0..distance.len() as u32 {
         let steps = u32::from(distance[texel as usize]).min(REACH + 1);
-        if steps == 0 {
+        let tile = water.tile_of(texel);
+        // Where nothing came, a reserve that has gone by does not come back.
+        if steps == 0 || !water.tiles.has(tile, Tiles::RENEWED) {
             continue;
         }
         water.settle(now, texel);
-        let tile = water.tile_of(texel);
         water.tiles.touch(tile);
         let inside = steps - 1;
         let water = &mut water.texels[texel as usize];
         water.reserve = (inside * 255 / REACH) as u8;
         water.rim = (255 - (inside * 255 / MARKED).min(255)) as u8;
     }
+    water.tiles.flags.iter_mut().for_each(|flags| *flags &= !Tiles::RENEWED);
     true
 }

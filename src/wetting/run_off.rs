@@ -5,8 +5,8 @@
 //! exceeds the retained film moves. Each texel of a busy tile gives to the lower ones among its four neighbours *on the
 //! mesh*, which may lie across a uv seam or on a steeper face.
 //!
-//! Stable for any step and any map: a texel never gives more than it has, nor so much that its neighbour would stand
-//! higher than itself. The price is that a film runs at most one texel a step.
+//! Stable for any step and any map: a texel never gives more than it has, and to none of its neighbours more than a quarter
+//! of what its surface lies higher. The price is that a film runs at most one texel a step.
 //!
 //! Moves are whole units: nothing is lost. A tile in which nothing moves goes to rest, and is woken by new water or by a
 //! neighbour that begins to drain.
@@ -16,7 +16,7 @@
 
 use super::drip::{Drip, DripSite};
 use super::geometry::{Link, Side};
-use super::surface::{Now, SurfaceWater, Tiles};
+use super::surface::{Now, SurfaceWater, Tiles, texel_in};
 use crate::overlay::TILE_SIZE;
 
 /// Steps a second, where there are as many ticks.
@@ -47,7 +47,7 @@ const TILE_TEXELS: usize = (TILE_SIZE * TILE_SIZE) as usize;
 const SLOW: f32 = 0.1;
 const FAST: f32 = 0.4;
 /// So often can the time be doubled.
-const MOST_PATIENCE: u8 = 3;
+pub(super) const MOST_PATIENCE: u8 = 3;
 
 /// Buffers that keep their memory from tick to tick.
 #[derive(Debug)]
@@ -157,10 +157,15 @@ fn step_tile(
         }
         let donor = Donor { texel, local, tile, film, excess };
         pool = true;
+        let first = moves.len();
         let (site, speed) = give(water, now, &donor, seconds, &scratch.film_mm, &mut moves);
         fastest = fastest.max(speed);
-        if let Some(site) = site {
-            shed |= shed_drop(water, now, &donor, site, drips);
+        if let Some(site) = site
+            && shed_drop(water, now, &donor, site, drips)
+        {
+            shed = true;
+            // What has dripped cannot run, too.
+            moves.truncate(first);
         }
     }
     for step in &moves {
@@ -251,8 +256,9 @@ fn give(
     let unit_mm = now.scale(water.units, donor.texel).unit_mm as f32;
     for (to, mm, inside) in out {
         let mm = mm * scale;
-        if mm > LEAST_MM_PER_S * seconds {
-            moves.push(Move { from: donor.texel, to, units: (mm / unit_mm) as u32, inside });
+        let units = (mm / unit_mm) as u32;
+        if mm > LEAST_MM_PER_S * seconds && units > 0 {
+            moves.push(Move { from: donor.texel, to, units, inside });
         }
     }
     if site.is_none() && !lower && geometry.facing_up(donor.texel) < OVERHANG {
@@ -274,12 +280,6 @@ fn retained(now: &Now, texel: u32) -> f32 {
     let hash = (hash ^ (hash >> 15)).wrapping_mul(0x85eb_ca6b);
     let part = f64::from(hash >> 8) / f64::from(1u32 << 24);
     now.material.retained_mm * (LEAST_RETAINED + (MOST_RETAINED - LEAST_RETAINED) * part * part) as f32
-}
-
-fn texel_in(size: u32, tile: u32, local: usize) -> u32 {
-    let across = size / TILE_SIZE;
-    let (x, y) = (local as u32 % TILE_SIZE, local as u32 / TILE_SIZE);
-    (tile / across * TILE_SIZE + y) * size + tile % across * TILE_SIZE + x
 }
 
 /// The film of a texel now, mm, without settling it. Where less than the least retained film lay at its reference time,
@@ -306,8 +306,11 @@ fn carry(water: &mut SurfaceWater, now: &Now, tile: u32, step: &Move) {
     water.texels[from as usize].film -= units;
     let film = water.texels[to as usize].film;
     let least = LEAST_RETAINED * f64::from(now.material.retained_mm);
-    if film == 0 || f64::from(film) * now.scale(water.units, to).unit_mm <= least {
-        // It may have run dry in the meantime.
+    if film == 0
+        || f64::from(film) * now.scale(water.units, to).unit_mm <= least
+        || (!inside && film_now(water, now, to) == 0.0)
+    {
+        // It may have run dry in the meantime; those of the own tile have been looked after.
         water.settle(now, to);
     }
     water.texels[to as usize].film += units;

@@ -57,6 +57,7 @@ fn hit_texel(now: &Now, drop: &Drop, size: u32) -> u32 {
 
 /// What has got water may run and spread. `tile`: of the texel.
 pub(crate) fn note_arrival(water: &mut SurfaceWater, now: &Now, texel: u32, tile: u32) {
+    water.tiles.renew(tile);
     if !water.tiles.has(tile, Tiles::RUNNING) {
         let film_mm = f64::from(water.texels[texel as usize].film) * now.scale(water.units, texel).unit_mm;
         if film_mm > f64::from(now.material.retained_mm) * LEAST_RETAINED {

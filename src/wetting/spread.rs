@@ -8,7 +8,7 @@
 //! Not here: matter below the uppermost layer, and gravity in the pores.
 
 use super::geometry::{Link, Side};
-use super::surface::{Now, SurfaceWater, Tiles};
+use super::surface::{Now, SurfaceWater, Tiles, texel_in};
 use crate::overlay::TILE_SIZE;
 
 /// Steps a second.
@@ -78,14 +78,19 @@ fn collect_moves(
     moves: &mut Vec<(u32, u32, u32)>,
 ) -> bool {
     let mut filling = false;
-    let across = water.size / TILE_SIZE;
     let capacity = now.matter.capacity_mm;
     let least = LEAST_PART * now.material.seen_mm();
     let (sorptivity, pore_volume) = (f64::from(now.material.sorptivity), f64::from(now.material.pore_volume));
-    for local in 0..TILE_SIZE * TILE_SIZE {
-        let (x, y) = (local % TILE_SIZE, local / TILE_SIZE);
-        let texel = (tile / across * TILE_SIZE + y) * water.size + tile % across * TILE_SIZE + x;
+    let most = diffusivity(sorptivity, pore_volume, 1.0);
+    for local in 0..(TILE_SIZE * TILE_SIZE) as usize {
+        let texel = texel_in(water.size, tile, local);
         if water.texels[texel as usize].is_dry() {
+            continue;
+        }
+        let distance = |side| f64::from(now.geometry.distance(texel, side)) * 1000.0;
+        let nearest = distance(Side::PlusU).min(distance(Side::PlusV));
+        // Marks grow where texels are settled.
+        if water.marks.is_empty() && most * seconds * capacity < least * nearest * nearest {
             continue;
         }
         let amounts = water.settle(now, texel);
@@ -97,8 +102,6 @@ fn collect_moves(
         let unit_mm = now.scale(water.units, texel).unit_mm;
         // Nobody takes more than one who is quite dry and yet takes as fast as this one gives.
         let fastest = diffusivity(sorptivity, pore_volume, own);
-        let distance = |side| f64::from(now.geometry.distance(texel, side)) * 1000.0;
-        let nearest = distance(Side::PlusU).min(distance(Side::PlusV));
         if fastest * seconds / (nearest * nearest) * own * capacity < least {
             continue;
         }
@@ -112,11 +115,12 @@ fn collect_moves(
             }
             let between = 0.5 * (fastest + diffusivity(sorptivity, pore_volume, theirs));
             let distance_mm = distance(side);
-            // A quarter of the difference at most: then four neighbours cannot turn it round.
+            // Less than a quarter of the difference: then four neighbours cannot turn it round.
             let part = (between * seconds / (distance_mm * distance_mm)).min(0.2);
             let mm = part * difference * capacity;
-            if mm > least {
-                moves.push((texel, other, (mm / unit_mm) as u32));
+            let units = (mm / unit_mm) as u32;
+            if mm > least && units > 0 {
+                moves.push((texel, other, units));
             }
         }
     }

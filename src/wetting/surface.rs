@@ -26,8 +26,6 @@ pub struct SurfaceWater {
     pub(crate) ledger: Ledger,
     /// Tick of the last water from outside; 0 for none since the rim was measured.
     pub(crate) rained_at: u32,
-    /// Goes up whenever it begins anew.
-    pub(crate) generation: u32,
 }
 
 /// What has become of the water of a surface; units.
@@ -66,6 +64,8 @@ impl Tiles {
     pub(crate) const POOL: u8 = 8;
     /// Has ever held water.
     pub(crate) const WET: u8 = 16;
+    /// Got water since its rims were measured.
+    pub(crate) const RENEWED: u8 = 32;
 
     fn set(list: &mut Vec<u32>, flags: &mut u8, flag: u8, tile: u32) {
         if *flags & flag == 0 {
@@ -87,9 +87,20 @@ impl Tiles {
         Self::set(&mut self.dirty, &mut self.flags[tile as usize], Self::DIRTY, tile);
     }
 
+    pub(crate) fn renew(&mut self, tile: u32) {
+        self.flags[tile as usize] |= Self::RENEWED;
+    }
+
     pub(crate) fn has(&self, tile: u32, flag: u8) -> bool {
         self.flags[tile as usize] & flag != 0
     }
+}
+
+/// A texel of a tile, by its number within it, row by row.
+pub(crate) fn texel_in(size: u32, tile: u32, local: usize) -> u32 {
+    let across = size / TILE_SIZE;
+    let (x, y) = (local as u32 % TILE_SIZE, local as u32 / TILE_SIZE);
+    (tile / across * TILE_SIZE + y) * size + tile % across * TILE_SIZE + x
 }
 
 /// What a surface's texels are asked with: its material, its exposure, and the time.
@@ -119,10 +130,7 @@ impl<'a> Now<'a> {
 
     /// Constants of a texel.
     pub(crate) fn scale(&self, units: Units, texel: u32) -> Scale {
-        let area = self.geometry.area_mm2()[texel as usize];
-        // Where nothing lies, a texel counts as one of mean size.
-        let area = if area > 0.0 { area } else { self.geometry.mean_mm2() };
-        Scale { unit_mm: units.mm_on(area.max(1e-6)), reserve_mm: self.material.reserve_mm() }
+        Scale { unit_mm: self.geometry.unit_mm(units, texel), reserve_mm: self.material.reserve_mm() }
     }
 
     /// What a texel holds now, as depths.
@@ -158,7 +166,6 @@ impl SurfaceWater {
             tiles: Tiles::default(),
             ledger: Ledger::default(),
             rained_at: 0,
-            generation: 0,
         }
     }
 
@@ -176,7 +183,8 @@ impl SurfaceWater {
         water.units = Units { shift: shift.min(Units::MAX_SHIFT) };
         (water.texels, water.marks, water.ledger, water.rained_at) = (texels, marks, ledger, rained_at);
         water.tiles.flags = vec![0; tiles.len()];
-        water.tiles.patience = tiles.iter().map(|&(_, patience)| patience.min(7)).collect();
+        water.tiles.patience =
+            tiles.iter().map(|&(_, patience)| patience.min(super::run_off::MOST_PATIENCE)).collect();
         for (tile, &(flags, _)) in tiles.iter().enumerate() {
             let tile = tile as u32;
             let set = |flag: u8| flags & flag != 0;
@@ -189,7 +197,7 @@ impl SurfaceWater {
             if set(Tiles::WET) {
                 water.tiles.touch(tile);
             }
-            water.tiles.flags[tile as usize] |= flags & Tiles::POOL;
+            water.tiles.flags[tile as usize] |= flags & (Tiles::POOL | Tiles::RENEWED);
         }
         water
     }
@@ -262,6 +270,7 @@ impl SurfaceWater {
         }
         for tile in 0..self.tiles.flags.len() as u32 {
             self.tiles.touch(tile);
+            self.tiles.renew(tile);
             self.tiles.run(tile);
             self.tiles.spread(tile);
         }
@@ -282,13 +291,11 @@ impl SurfaceWater {
 
     /// Dry again, as on the first day.
     pub(crate) fn reset(&mut self) {
-        let generation = self.generation + 1;
         self.texels.clear();
         self.marks.clear();
         self.tiles = Tiles::default();
         self.ledger = Ledger::default();
         self.rained_at = 0;
-        self.generation = generation;
     }
 
     /// The tile of a texel.
@@ -311,7 +318,7 @@ impl SurfaceWater {
         let amounts = now.amounts(&scale, texel, water);
         let look = now.look(&amounts, water);
         let pores_before = scale.amounts(water).pores_mm;
-        self.ledger.evaporated += scale.commit(water, amounts, look, now.tick);
+        self.ledger.evaporated += scale.commit(water, amounts, look, now.tick, jitter(texel, now.tick));
         if let Some(marks) = self.marks.get_mut(texel as usize) {
             let left = amounts.film_mm + amounts.pores_mm;
             marks.grow(now.material, pores_before - left, water.rim);
@@ -351,13 +358,20 @@ impl SurfaceWater {
             let mut copy = *water;
             let amounts = now.amounts(&scale, texel as u32, water);
             if copy.tick < now.tick {
-                stock.evaporated += scale.commit(&mut copy, amounts, WaterLook::default(), now.tick);
+                stock.evaporated += scale.commit(&mut copy, amounts, WaterLook::default(), now.tick, 0.0);
             }
             stock.film += u64::from(copy.film);
             stock.pores += u64::from(copy.pores);
         }
         stock
     }
+}
+
+/// An even number in [0, 1) for a texel at a tick.
+fn jitter(texel: u32, tick: u32) -> f64 {
+    let hash = (texel.wrapping_mul(0x9e37_79b9) ^ tick).wrapping_mul(0x85eb_ca6b);
+    let hash = (hash ^ (hash >> 15)).wrapping_mul(0xc2b2_ae35);
+    f64::from(hash ^ (hash >> 16)) / 4_294_967_296.0
 }
 
 /// Where the water of a surface is at a moment; units.
@@ -369,4 +383,31 @@ pub struct Stock {
     pub pores: u64,
     /// Gone into the air.
     pub evaporated: u64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_changes_by_less_than_a_byte_a_time_changes_in_the_long_run() {
+        let scale = Scale { unit_mm: 1.0e-6, reserve_mm: 0.05 };
+        let (mut reserve, mut shown, mut steps) = (0, 0, 0);
+        for texel in 0..200 {
+            let mut water = TexelWater { film: 9, pores: 9, reserve: 200, shown: 20, ..default() };
+            for tick in 1..=400 {
+                let amounts = scale.amounts(&water);
+                // A fifth of a step each.
+                let less = Amounts { reserve_mm: amounts.reserve_mm - 0.05 / 255.0 / 5.0, ..amounts };
+                let wetness = (f64::from(water.shown) + 0.2) / 255.0;
+                let look = WaterLook { wetness, gloss: 0.0, film: 1.0 };
+                scale.commit(&mut water, less, look, tick, jitter(texel, tick));
+            }
+            reserve += u32::from(water.reserve);
+            shown += u32::from(water.shown);
+            steps += 1;
+        }
+        assert!((reserve as f32 / steps as f32 - 120.0).abs() < 2.0, "{reserve}");
+        assert!((shown as f32 / steps as f32 - 100.0).abs() < 2.0, "{shown}");
+    }
 }

@@ -100,8 +100,16 @@ impl Scale {
     }
 
     /// Makes `amounts` the texel's own at `tick`; returns the units that evaporated on the way. What is rounded off stays
-    /// in the film or, if there is none, counts as evaporated: nothing is lost.
-    pub fn commit(&self, texel: &mut TexelWater, amounts: Amounts, look: WaterLook, tick: u32) -> u64 {
+    /// in the film or, if there is none, counts as evaporated: nothing is lost. `jitter`, evenly spread over [0, 1), decides
+    /// which way bytes are rounded: else what changes by less than half a step each time would never change.
+    pub fn commit(
+        &self,
+        texel: &mut TexelWater,
+        amounts: Amounts,
+        look: WaterLook,
+        tick: u32,
+        jitter: f64,
+    ) -> u64 {
         let before = texel.total();
         // Rounds, since it is not negative; saturates.
         let units = |mm: f64| (mm.max(0.0) / self.unit_mm + 0.5) as u64;
@@ -111,12 +119,11 @@ impl Scale {
         texel.film = u32::try_from(film).unwrap_or(u32::MAX);
         texel.pores = u32::try_from(pores).unwrap_or(u32::MAX);
         texel.tick = tick;
-        let byte = |part: f64| (part * 255.0 + 0.5) as u8;
+        let byte = |part: f64| (part * 255.0 + jitter) as u8;
         texel.shown = byte(look.wetness);
         texel.filmed = if film > 0 { byte(look.film) } else { 0 };
         let reserve = if self.reserve_mm > 0.0 { amounts.reserve_mm / self.reserve_mm } else { 0.0 };
-        // Up, so that it does not last for ever less than it should.
-        texel.reserve = (reserve * 255.0 + 0.999_999) as u8;
+        texel.reserve = byte(reserve);
         before - texel.total()
     }
 }
@@ -145,10 +152,10 @@ mod tests {
         let start = TexelWater { film: 1000, pores: 5000, tick: 1, ..Default::default() };
         let mut texel = start;
         let amounts = Amounts { film_mm: 0.0006, pores_mm: 0.0053, reserve_mm: 0.01 };
-        let gone = scale.commit(&mut texel, amounts, look, 9);
+        let gone = scale.commit(&mut texel, amounts, look, 9, 0.5);
         assert_eq!((texel.film, texel.pores, texel.tick, gone), (600, 5300, 9, 100));
         assert_eq!((texel.shown, texel.reserve), (128, 51));
-        let gone = scale.commit(&mut texel, Amounts::default(), look, 10);
+        let gone = scale.commit(&mut texel, Amounts::default(), look, 10, 0.5);
         assert_eq!((texel.total(), gone), (0, 5900));
     }
 }

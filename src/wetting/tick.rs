@@ -12,6 +12,7 @@ use super::spread::{SpreadScratch, spread};
 use super::{Dripping, DropQueue, Exposure, Now, SurfaceWater, WetGeometry};
 use crate::clock::WeatheringClock;
 use crate::material::PorousMaterial;
+use crate::particle::for_each_chunk;
 use crate::weather::DryingClock;
 
 /// What the water has cost so far. Surfaces at rest add nothing.
@@ -72,13 +73,9 @@ pub(super) fn advance_water(
     scratch: Local<Parallel<Scratch>>,
     mut surfaces: Query<Surface>,
 ) {
-    let busy = |water: &SurfaceWater, drops: &DropQueue| {
-        !drops.0.is_empty() || !water.is_at_rest() || water.rained_at != 0
-    };
-    let count = surfaces.iter().filter(|(water, drops, ..)| busy(water, drops)).count();
-    if count == 0 {
-        return;
-    }
+    let is_busy =
+        |(water, drops, ..): &SurfaceItem| !drops.0.is_empty() || !water.is_at_rest() || water.rained_at != 0;
+    let busy: Vec<SurfaceItem> = surfaces.iter_mut().filter(is_busy).collect();
     let default = PorousMaterial::default();
     let advance =
         |scratch: &mut Scratch,
@@ -88,7 +85,7 @@ pub(super) fn advance_water(
             let material = material.unwrap_or(&default);
             let now = Now::new(clock.tick(), clock.hz(), &drying, &geometry.0, exposure, material);
             if !drops.0.is_empty() {
-                water.wake(material.efflorescence > 0.0 || material.tide_mark > 0.0);
+                water.wake(material.leaves_marks());
             }
             for drop in &drops.0 {
                 soak(water, &now, drop, &mut scratch.soak);
@@ -103,22 +100,8 @@ pub(super) fn advance_water(
             let measured = measure_rims(water, &now, &mut scratch.rim);
             stats.rims.fetch_add(u64::from(measured), Ordering::Relaxed);
         };
-    let busy_ones = |item: &SurfaceItem| busy(&item.0, &item.1);
-    if count == 1 {
-        let mut scratch = scratch.borrow_local_mut();
-        surfaces.iter_mut().filter(busy_ones).for_each(|item| advance(&mut scratch, item));
-    } else {
-        let scratch = &*scratch;
-        let one_each = bevy::ecs::batching::BatchingStrategy::fixed(1);
-        surfaces.par_iter_mut().batching_strategy(one_each).for_each_init(
-            || scratch.borrow_local_mut(),
-            |scratch, item| {
-                if busy_ones(&item) {
-                    advance(scratch, item);
-                }
-            },
-        );
-    }
+    let scratch = &*scratch;
+    for_each_chunk(busy.into_iter(), |item| advance(&mut scratch.borrow_local_mut(), item));
 }
 
 type SurfaceItem<'w, 's> = bevy::ecs::query::QueryItem<'w, 's, Surface>;

@@ -1,0 +1,193 @@
+//! How far it is, at least, from anywhere in a scene to the nearest surface.
+//!
+//! A grid over the scene's box knows for each cell how many cells away the nearest one with a triangle in it is. A segment
+//! that is shorter than that hits nothing, and is not cast. Most particles are in the air most of the time: this is all they
+//! cost. It only ever says no where there is nothing to hit, so hits are the same with and without it.
+//!
+//! Worked out in the background once a scene has kept still for some frames; while surfaces move, all segments are cast.
+
+use bevy::prelude::*;
+use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+
+use super::CollisionScene;
+
+/// Frames that a scene has to keep still.
+const STILL_FRAMES: u32 = 30;
+
+/// What is under way.
+#[derive(Default)]
+pub(super) struct ClearanceWork {
+    still: u32,
+    task: Option<Task<Option<Clearance>>>,
+}
+
+/// Works out the clearance of a scene that keeps still.
+pub(super) fn measure_clearance(mut scene: ResMut<CollisionScene>, mut work: Local<ClearanceWork>) {
+    if scene.is_changed() {
+        // Meant for another scene.
+        *work = ClearanceWork::default();
+        return;
+    }
+    if let Some(task) = &mut work.task {
+        if let Some(clearance) = check_ready(task) {
+            // The scene is the same: to those who look for changes, too.
+            scene.bypass_change_detection().set_clearance(clearance);
+            work.task = None;
+        }
+    } else if work.still < STILL_FRAMES {
+        work.still += 1;
+        if work.still == STILL_FRAMES
+            && let Some(measure) = scene.clearance_work()
+        {
+            work.task = Some(AsyncComputeTaskPool::get().spawn(async move { measure() }));
+        }
+    }
+}
+
+/// Cells along the longest side of the box.
+const CELLS: f32 = 96.0;
+
+/// Distances to the nearest surface, cell by cell.
+#[derive(Debug, Clone)]
+pub(super) struct Clearance {
+    low: Vec3,
+    cell: f32,
+    size: UVec3,
+    /// Steps to the nearest cell that holds a part of a triangle, diagonal ones too; x runs fastest.
+    steps: Vec<u8>,
+}
+
+impl Clearance {
+    /// Of triangles in world space that lie in the box.
+    pub(super) fn new((low, high): (Vec3, Vec3), triangles: impl Iterator<Item = [Vec3; 3]>) -> Option<Self> {
+        let extent = high - low;
+        let cell = extent.max_element() / CELLS;
+        if !(extent.is_finite() && cell > 0.0) {
+            return None;
+        }
+        let size = (extent / cell).ceil().as_uvec3().max(UVec3::ONE);
+        let count = size.element_product() as usize;
+        let mut grid = Self { low, cell, size, steps: vec![u8::MAX; count] };
+        triangles.for_each(|triangle| grid.mark(triangle));
+        grid.measure();
+        Some(grid)
+    }
+
+    fn index(&self, at: UVec3) -> usize {
+        ((at.z * self.size.y + at.y) * self.size.x + at.x) as usize
+    }
+
+    /// Marks the cells that the plane of a triangle cuts within its box.
+    fn mark(&mut self, [a, b, c]: [Vec3; 3]) {
+        // A little more than the cell, for rounding.
+        let half = Vec3::splat(0.5 * self.cell * 1.001) + self.low.abs().max_element() * 1e-6;
+        let cell_of = |point: Vec3| {
+            let at = (point - self.low) / self.cell;
+            at.max(Vec3::ZERO).as_uvec3().min(self.size - UVec3::ONE)
+        };
+        let margin = half - 0.5 * self.cell;
+        let from = cell_of(a.min(b).min(c) - margin);
+        let to = cell_of(a.max(b).max(c) + margin);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let reach = normal.abs().dot(half);
+        for z in from.z..=to.z {
+            for y in from.y..=to.y {
+                for x in from.x..=to.x {
+                    let at = UVec3::new(x, y, z);
+                    let middle = self.low + (at.as_vec3() + 0.5) * self.cell;
+                    if normal.dot(middle - a).abs() <= reach {
+                        let index = self.index(at);
+                        self.steps[index] = 0;
+                    }
+                }
+            }
+        }
+    }
+
+    /// The chessboard distance of every cell to the nearest marked one, in two passes (Rosenfeld and Pfaltz 1966).
+    fn measure(&mut self) {
+        let size = self.size.as_ivec3();
+        let before: Vec<IVec3> = (0..27)
+            .map(|number| IVec3::new(number % 3 - 1, number / 3 % 3 - 1, number / 9 - 1))
+            .take(13)
+            .collect();
+        let cells = size.element_product();
+        let place =
+            |index: i32| IVec3::new(index % size.x, index / size.x % size.y, index / (size.x * size.y));
+        for forward in [true, false] {
+            for number in 0..cells {
+                let index = if forward { number } else { cells - 1 - number };
+                let at = place(index);
+                let mut least = self.steps[index as usize];
+                for &step in &before {
+                    let beside = if forward { at + step } else { at - step };
+                    if beside.cmpge(IVec3::ZERO).all() && beside.cmplt(size).all() {
+                        let there = self.steps[self.index(beside.as_uvec3())];
+                        least = least.min(there.saturating_add(1));
+                    }
+                }
+                self.steps[index as usize] = least;
+            }
+        }
+    }
+
+    /// Whether a segment hits nothing for certain. One that begins outside the box may hit something.
+    #[inline]
+    pub(super) fn is_clear(&self, start: Vec3, end: Vec3) -> bool {
+        let at = (start - self.low) / self.cell;
+        if !(at.cmpge(Vec3::ZERO).all() && at.cmplt(self.size.as_vec3()).all()) {
+            return false;
+        }
+        let steps = self.steps[self.index(at.as_uvec3())];
+        // From anywhere in this cell it is that many cells, less one, to the nearest that is not empty.
+        (end - start).abs().max_element() < (f32::from(steps) - 1.0) * self.cell * 0.999
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::collision::{MeshBvh, MeshTriangles};
+    use crate::scenes::meshes::ground;
+
+    #[test]
+    fn what_is_called_clear_hits_nothing_and_much_is_called_clear() {
+        let ball = Mesh::from(Sphere::new(0.5)).translated_by(Vec3::new(0.3, 0.9, -0.2));
+        let mut triangles = MeshTriangles::from_mesh(&ball).unwrap();
+        let floor = MeshTriangles::from_mesh(&ground(Vec2::splat(4.0), UVec2::splat(3)).unwrap()).unwrap();
+        triangles.positions.extend(floor.positions);
+        triangles.uvs.extend(floor.uvs);
+        triangles.source = (0..triangles.positions.len() as u32).collect();
+        let bvh = MeshBvh::build(triangles);
+        let grid = Clearance::new(bvh.bounds(), bvh.triangles().positions.iter().copied()).unwrap();
+        let (low, high) = bvh.bounds();
+        let mut state = 1u64;
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 40) as f32 / (1u32 << 24) as f32
+        };
+        let (mut clear, mut hits) = (0, 0);
+        for _ in 0..50_000 {
+            let start = low + (high - low) * Vec3::new(random(), random(), random());
+            let way = Vec3::new(random(), random(), random()) - 0.5;
+            let end = start + way * 0.5 * random();
+            let hit = bvh.cast(start, end).is_some();
+            let is_clear = grid.is_clear(start, end);
+            assert!(!(hit && is_clear), "{start} {end}");
+            clear += u32::from(is_clear);
+            hits += u32::from(hit);
+        }
+        assert!(clear > 25_000 && hits > 1_000, "{clear} {hits}");
+    }
+
+    #[test]
+    fn nothing_and_nonsense_are_never_clear() {
+        assert!(Clearance::new((Vec3::INFINITY, Vec3::NEG_INFINITY), std::iter::empty()).is_none());
+        assert!(Clearance::new((Vec3::ZERO, Vec3::ZERO), std::iter::empty()).is_none());
+        let grid =
+            Clearance::new((Vec3::ZERO, Vec3::ONE), [[Vec3::ZERO, Vec3::X, Vec3::Y]].into_iter()).unwrap();
+        assert!(!grid.is_clear(Vec3::NAN, Vec3::ONE) && !grid.is_clear(Vec3::splat(0.9), Vec3::NAN));
+        assert!(!grid.is_clear(Vec3::splat(5.0), Vec3::splat(5.1)));
+        assert!(grid.is_clear(Vec3::splat(0.9), Vec3::splat(0.8)));
+    }
+}
