@@ -6,7 +6,7 @@ use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
-use super::{MeshBvh, MeshTriangles, TriangleError, TriangleReport};
+use super::{Deformer, MeshBvh, MeshTriangles, TriangleError, TriangleReport};
 use crate::overlay::Weatherable;
 
 /// The BVH of this entity's mesh. Added to every [`Weatherable`] entity once it is built.
@@ -102,7 +102,9 @@ pub(super) fn build_colliders(
             collider.stale = false;
             match MeshTriangles::from_mesh(mesh) {
                 Ok(triangles) => {
-                    let build = async move { Ok(Arc::new(MeshBvh::build(triangles))) };
+                    let deformer = Deformer::from_mesh(mesh, &triangles);
+                    let build =
+                        async move { Ok(Arc::new(MeshBvh::build(triangles).with_deformer(deformer))) };
                     collider.task = Some(AsyncComputeTaskPool::get().spawn(build));
                 }
                 Err(error) => (collider.built, *news) = (Some(Err(error)), true),

@@ -9,13 +9,14 @@
 //! The loop is parallel over particles. Threads write to their own buffers; one sort by [`Sequence`] merges them,
 //! so the order of [`Impacts`] does not depend on the number of threads.
 //!
-//! Not here: skinned and morphed meshes (they are hit where their bind pose is).
+//! Skinned and morphed surfaces have a BVH each, which follows their pose (`deform`).
 //!
 //! [`Sequence`]: crate::particle::Sequence
 
 mod bvh;
 mod clearance;
 mod colliders;
+mod deform;
 mod scene;
 mod trace;
 mod triangles;
@@ -28,6 +29,7 @@ use crate::schedule::{RetireParticles, WeatheringSystems, WeatheringTick};
 
 pub use bvh::{LocalHit, MeshBvh};
 pub use colliders::{ColliderReport, MeshColliders, NotWeatherable, SurfaceCollider};
+pub use deform::{Deformer, DeformingCollider, PosedMesh, Shape};
 pub use scene::{CollisionScene, SceneHit};
 pub use trace::{ReportImpacts, SurfaceImpact, trace_particles};
 pub use triangles::{MeshTriangles, TriangleError, TriangleReport};
@@ -78,14 +80,24 @@ impl Plugin for CollisionPlugin {
             .add_observer(colliders::release_surface)
             .add_systems(
                 PreUpdate,
-                (colliders::watch_meshes, colliders::build_colliders, colliders::attach_colliders)
+                (
+                    colliders::watch_meshes,
+                    colliders::build_colliders,
+                    colliders::attach_colliders,
+                    deform::attach_deforming,
+                )
                     .chain()
                     .in_set(BuildColliders),
             )
             .add_systems(PreUpdate, clearance::measure_clearance)
             .add_systems(
                 WeatheringTick,
-                (scene::update_collision_scene, trace_particles, trace::report_impacts)
+                (
+                    deform::pose_surfaces,
+                    scene::update_collision_scene,
+                    trace_particles,
+                    trace::report_impacts,
+                )
                     .chain()
                     .in_set(WeatheringSystems::Trace)
                     // The dead are despawned when nobody needs them any more.

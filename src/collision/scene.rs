@@ -1,21 +1,28 @@
-//! All surfaces with their transforms, under one BVH.
-
-use std::sync::Arc;
+//! All surfaces with their transforms, under two BVHs: one over those that are rigid, one over those that deform.
+//!
+//! What deforms moves in most frames. It has a part of its own, so that the rest need not be put together anew.
 
 use bevy::math::Affine3A;
 use bevy::prelude::*;
 
 use super::bvh::{BoxBvh, Segment};
 use super::clearance::Clearance;
-use super::{LocalHit, MeshBvh, SurfaceCollider};
+use super::{DeformingCollider, LocalHit, Shape, SurfaceCollider};
 
-/// Every surface that can be hit, where it is now.
+/// Every surface that can be hit, where it is now. Its change detection is about the rigid ones.
 #[derive(Resource, Default)]
 pub struct CollisionScene {
+    rigid: Part,
+    deforming: Part,
+    /// Of the rigid part.
+    clearance: Option<Clearance>,
+}
+
+/// Some of the surfaces, under one BVH.
+struct Part {
     instances: Vec<Instance>,
     top: BoxBvh,
     bounds: (Vec3, Vec3),
-    clearance: Option<Clearance>,
 }
 
 #[derive(Clone)]
@@ -23,7 +30,7 @@ struct Instance {
     surface: Entity,
     world_from_mesh: Affine3A,
     mesh_from_world: Affine3A,
-    bvh: Arc<MeshBvh>,
+    shape: Shape,
 }
 
 /// The closest hit of a segment in the scene.
@@ -46,109 +53,142 @@ pub struct SceneHit {
 }
 
 impl CollisionScene {
-    /// A scene of these surfaces. Order matters for nothing but ties. What cannot be inverted (a scale of 0) or is
-    /// not finite is left out.
-    pub fn new(surfaces: impl IntoIterator<Item = (Entity, Affine3A, Arc<MeshBvh>)>) -> Self {
-        let instances: Vec<Instance> = surfaces
-            .into_iter()
-            .filter(|(_, world_from_mesh, _)| {
-                let volume = world_from_mesh.matrix3.determinant();
-                world_from_mesh.is_finite() && volume.is_finite() && volume != 0.0
-            })
-            .map(|(surface, world_from_mesh, bvh)| Instance {
-                surface,
-                world_from_mesh,
-                mesh_from_world: world_from_mesh.inverse(),
-                bvh,
-            })
-            .collect();
-        let boxes: Vec<(Vec3, Vec3)> = instances.iter().map(Instance::bounds).collect();
-        let top = BoxBvh::build(&boxes);
-        let bounds = top.bounds();
-        Self { instances, top, bounds, clearance: None }
+    /// A scene of these surfaces. Order matters for nothing but ties. What cannot be inverted (a scale of 0), is not
+    /// finite, or has nothing that can be hit is left out.
+    pub fn new<S: Into<Shape>>(surfaces: impl IntoIterator<Item = (Entity, Affine3A, S)>) -> Self {
+        let surfaces = surfaces.into_iter().map(|(surface, at, shape)| (surface, at, shape.into()));
+        let (deforming, rigid): (Vec<_>, Vec<_>) =
+            surfaces.partition(|(.., shape)| matches!(shape, Shape::Deforming(_)));
+        Self { rigid: Part::new(rigid), deforming: Part::new(deforming), clearance: None }
     }
 
     /// Number of surfaces.
     pub fn len(&self) -> usize {
-        self.instances.len()
+        self.rigid.instances.len() + self.deforming.instances.len()
     }
 
     /// Whether there is nothing to hit.
     pub fn is_empty(&self) -> bool {
-        self.instances.is_empty()
+        self.len() == 0
     }
 
     /// Smallest and largest corner of everything that can be hit; infinite, the wrong way round, if there is nothing.
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        self.bounds
+        let ((low, high), (other_low, other_high)) = (self.rigid.bounds, self.deforming.bounds);
+        (low.min(other_low), high.max(other_high))
     }
 
     /// The closest hit on the segment from `start` to `end`, seen from either side.
     #[inline]
     pub fn cast(&self, start: Vec3, end: Vec3) -> Option<SceneHit> {
         // Most particles are in the air: this is all they cost.
-        if !segment_near_box(start, end, self.bounds)
-            || self.clearance.as_ref().is_some_and(|clearance| clearance.is_clear(start, end))
-        {
+        let is_clear = || self.clearance.as_ref().is_some_and(|clearance| clearance.is_clear(start, end));
+        let rigid = segment_near_box(start, end, self.rigid.bounds) && !is_clear();
+        let deforming = segment_near_box(start, end, self.deforming.bounds);
+        if !(rigid || deforming) {
             return None;
         }
-        self.cast_near(start, end)
+        self.cast_near(start, end, rigid, deforming)
     }
 
-    /// Work that tells how far off everything is: nothing, for a scene that knows or has nothing.
+    /// Work that tells how far off everything rigid is: nothing, for a scene that knows or has nothing.
     pub(super) fn clearance_work(&self) -> Option<impl FnOnce() -> Option<Clearance> + Send + 'static> {
-        if self.is_empty() || self.clearance.is_some() {
+        if self.rigid.instances.is_empty() || self.clearance.is_some() {
             return None;
         }
-        let (instances, bounds) = (self.instances.clone(), self.bounds);
+        let (instances, bounds) = (self.rigid.instances.clone(), self.rigid.bounds);
         Some(move || {
             let triangles = instances.iter().flat_map(|instance| {
                 let to_world = |corner| instance.world_from_mesh.transform_point3(corner);
-                instance.bvh.triangles().positions.iter().map(move |corners| corners.map(to_world))
+                let triangles = &instance.shape.triangles().positions;
+                triangles.iter().map(move |corners| corners.map(to_world))
             });
             Clearance::new(bounds, triangles)
         })
     }
 
-    /// What has been worked out for exactly this scene.
+    /// What has been worked out for exactly these rigid surfaces.
     pub(super) fn set_clearance(&mut self, clearance: Option<Clearance>) {
         self.clearance = clearance;
     }
 
-    fn cast_near(&self, start: Vec3, end: Vec3) -> Option<SceneHit> {
-        let mut closest: Option<(usize, LocalHit)> = None;
-        self.top.visit(Segment::new(start, end)?, |index, fraction| {
-            let instance = &self.instances[index as usize];
-            let to_mesh = |point| instance.mesh_from_world.transform_point3(point);
-            let hit = instance.bvh.cast_within(Segment::new(to_mesh(start), to_mesh(end))?, fraction)?;
-            closest = Some((index as usize, hit));
-            Some(hit.fraction)
-        });
-        let (index, hit) = closest?;
-        Some(self.instances[index].resolve(start, end, hit))
+    /// Lets go of the surfaces that deform, so that their shapes can change in place.
+    pub(super) fn forget_deforming(&mut self) {
+        self.deforming = Part::default();
+    }
+
+    fn cast_near(&self, start: Vec3, end: Vec3, rigid: bool, deforming: bool) -> Option<SceneHit> {
+        let segment = Segment::new(start, end)?;
+        let mut closest: Option<(&Instance, LocalHit)> = None;
+        for (part, is_near) in [(&self.rigid, rigid), (&self.deforming, deforming)] {
+            if is_near {
+                let within = closest.map_or(1.0, |(_, hit)| hit.fraction);
+                closest = part.cast(segment, start, end, within).or(closest);
+            }
+        }
+        let (instance, hit) = closest?;
+        Some(instance.resolve(start, end, hit))
     }
 }
 
-impl Instance {
-    /// Box around the eight corners of the mesh's box, in world space.
-    fn bounds(&self) -> (Vec3, Vec3) {
-        let (min, max) = self.bvh.bounds();
-        let corner = |i: u32| {
-            let pick = |axis: u32, low: f32, high: f32| if i >> axis & 1 == 0 { low } else { high };
-            let corner = Vec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z));
-            self.world_from_mesh.transform_point3(corner)
-        };
-        (0..8).map(corner).fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), corner| {
-            (low.min(corner), high.max(corner))
-        })
+impl Default for Part {
+    fn default() -> Self {
+        Self::new(Vec::new())
+    }
+}
+
+impl Part {
+    fn new(surfaces: Vec<(Entity, Affine3A, Shape)>) -> Self {
+        let (mut instances, mut boxes) = (Vec::new(), Vec::new());
+        for (surface, world_from_mesh, shape) in surfaces {
+            let volume = world_from_mesh.matrix3.determinant();
+            let is_placed = world_from_mesh.is_finite() && volume.is_finite() && volume != 0.0;
+            if let Some(bounds) = shape.bounds()
+                && is_placed
+            {
+                boxes.push(bounds_in_world(bounds, &world_from_mesh));
+                let mesh_from_world = world_from_mesh.inverse();
+                instances.push(Instance { surface, world_from_mesh, mesh_from_world, shape });
+            }
+        }
+        let top = BoxBvh::build(&boxes);
+        let bounds = top.bounds();
+        Self { instances, top, bounds }
     }
 
+    /// The closest hit on this fraction of the segment.
+    fn cast(&self, segment: Segment, start: Vec3, end: Vec3, within: f32) -> Option<(&Instance, LocalHit)> {
+        let mut closest: Option<(&Instance, LocalHit)> = None;
+        self.top.visit(segment, |index, fraction| {
+            let instance = &self.instances[index as usize];
+            let to_mesh = |point| instance.mesh_from_world.transform_point3(point);
+            let segment = Segment::new(to_mesh(start), to_mesh(end))?;
+            let hit = instance.shape.cast_within(segment, fraction.min(within))?;
+            closest = Some((instance, hit));
+            Some(hit.fraction)
+        });
+        closest
+    }
+}
+
+/// Box around the eight corners of a mesh's box, in world space.
+fn bounds_in_world((min, max): (Vec3, Vec3), world_from_mesh: &Affine3A) -> (Vec3, Vec3) {
+    let corner = |i: u32| {
+        let pick = |axis: u32, low: f32, high: f32| if i >> axis & 1 == 0 { low } else { high };
+        let corner = Vec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z));
+        world_from_mesh.transform_point3(corner)
+    };
+    (0..8)
+        .map(corner)
+        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), corner| (low.min(corner), high.max(corner)))
+}
+
+impl Instance {
     /// Point, normal and uv of a hit.
     fn resolve(&self, start: Vec3, end: Vec3, hit: LocalHit) -> SceneHit {
-        let triangles = self.bvh.triangles();
+        let triangles = self.shape.triangles();
         let index = hit.triangle as usize;
-        let [a, b, c] =
-            triangles.positions[index].map(|corner| self.world_from_mesh.transform_point3(corner));
+        let [a, b, c] = self.shape.corners(index).map(|corner| self.world_from_mesh.transform_point3(corner));
         let [uv_a, uv_b, uv_c] = triangles.uvs[index];
         let point = start.lerp(end, hit.fraction);
         let (ab, ac) = (b - a, c - a);
@@ -186,34 +226,65 @@ fn segment_near_box(start: Vec3, end: Vec3, (min, max): (Vec3, Vec3)) -> bool {
     (start.min(end).cmple(max) & start.max(end).cmpge(min)).all()
 }
 
-/// Follows surfaces that appear, move or go. Costs nothing while none does.
+/// Follows surfaces that appear, move, deform or go. Costs nothing while none does.
 pub(super) fn update_collision_scene(
     mut scene: ResMut<CollisionScene>,
-    surfaces: Query<(Entity, &GlobalTransform, &SurfaceCollider)>,
-    changed: Query<(), (With<SurfaceCollider>, Or<(Changed<GlobalTransform>, Changed<SurfaceCollider>)>)>,
-    mut known: Local<usize>,
+    rigid: Query<(Entity, &GlobalTransform, &SurfaceCollider), Without<DeformingCollider>>,
+    deforming: Query<(Entity, &GlobalTransform, &DeformingCollider), With<SurfaceCollider>>,
+    moved: Query<
+        (),
+        (
+            With<SurfaceCollider>,
+            Without<DeformingCollider>,
+            Or<(Changed<GlobalTransform>, Changed<SurfaceCollider>)>,
+        ),
+    >,
+    deformed: Query<
+        (),
+        (
+            With<SurfaceCollider>,
+            With<DeformingCollider>,
+            Or<(Changed<GlobalTransform>, Changed<DeformingCollider>)>,
+        ),
+    >,
+    joined: Query<(), (With<SurfaceCollider>, Added<DeformingCollider>)>,
+    mut known: Local<[usize; 2]>,
 ) {
     // By number, because news of a removal last two frames, and frames without a tick come in any number. Who comes in
     // place of who went has changed.
-    let count = surfaces.iter().len();
-    if count == *known && changed.is_empty() {
-        return;
-    }
+    let count = [rigid.iter().len(), deforming.iter().len()];
+    let others = count != *known || !joined.is_empty();
     *known = count;
-    let mut surfaces: Vec<_> = surfaces
-        .iter()
-        .map(|(entity, transform, collider)| (entity, transform.affine(), collider.0.clone()))
-        .collect();
-    surfaces.sort_unstable_by_key(|(entity, ..)| *entity);
-    *scene = CollisionScene::new(surfaces);
+    if others || !moved.is_empty() {
+        let mut surfaces: Vec<_> = rigid
+            .iter()
+            .map(|(entity, transform, collider)| {
+                (entity, transform.affine(), Shape::from(collider.0.clone()))
+            })
+            .collect();
+        surfaces.sort_unstable_by_key(|(entity, ..)| *entity);
+        (scene.rigid, scene.clearance) = (Part::new(surfaces), None);
+    }
+    if others || !deformed.is_empty() {
+        let placed = |(entity, transform, collider): (Entity, &GlobalTransform, &DeformingCollider)| {
+            let (at, posed) = collider.placed(transform)?;
+            Some((entity, at, Shape::from(posed)))
+        };
+        let mut surfaces: Vec<_> = deforming.iter().filter_map(placed).collect();
+        surfaces.sort_unstable_by_key(|(entity, ..)| *entity);
+        // Nothing that is rigid has changed.
+        scene.bypass_change_detection().deforming = Part::new(surfaces);
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use bevy::math::Quat;
 
     use super::*;
-    use crate::collision::MeshTriangles;
+    use crate::collision::{MeshBvh, MeshTriangles};
 
     fn square() -> Arc<MeshBvh> {
         let mesh = Mesh::from(Plane3d::new(Vec3::Y, Vec2::ONE));

@@ -86,10 +86,9 @@ fn cdf_step(axis: Axis, edge: i32) -> u32 {
     into as u32 * CDF_STEPS / (2 * axis.radius as u32)
 }
 
-/// Water that a texel gets from a stamp of `volume`, by the coverage of its column and row.
-pub fn share(volume: u32, column: [u32; 2], row: [u32; 2]) -> u32 {
-    let in_row = scale_floor(volume, row[1]) - scale_floor(volume, row[0]);
-    scale_floor(in_row, column[1]) - scale_floor(in_row, column[0])
+/// The part of `volume` that lies between the two ends of a coverage: of a stamp in a row and, of that, in a texel.
+pub fn share(volume: u32, coverage: [u32; 2]) -> u32 {
+    scale_floor(volume, coverage[1]) - scale_floor(volume, coverage[0])
 }
 
 /// Distance of the texel's middle from the stamp's, along one axis; 256 is the radius.
@@ -154,7 +153,7 @@ mod tests {
         let column = |x| axis_coverage(u, x);
         (0..v.size)
             .flat_map(|y| (0..u.size).map(move |x| (x, axis_coverage(v, y))))
-            .map(|(x, row)| u64::from(share(volume, column(x), row)))
+            .map(|(x, row)| u64::from(share(share(volume, row), column(x))))
             .sum()
     }
 

@@ -41,6 +41,12 @@ impl DryingClock {
 
     /// What could have evaporated until a tick, mm.
     pub fn until(&self, tick: u32) -> Demand {
+        // The last one is what most ask for.
+        if let Some(last) = self.points.last()
+            && last.tick <= tick
+        {
+            return last.until(tick);
+        }
         let after = self.points.partition_point(|point| point.tick <= tick);
         self.points[after.saturating_sub(1)].until(tick)
     }

@@ -19,6 +19,9 @@ pub use super::links::Link;
 /// `facing_up` of a texel that faces up.
 const STRAIGHT_UP: f32 = 127.0;
 
+/// Marks a texel among triangles. There are fewer triangles than this.
+const STAND_IN: u32 = 1 << 31;
+
 /// Where the texels of a map lie in the world, and who lies beside whom on the mesh.
 ///
 /// Texels are numbered row by row from v = 0. One that lies on a triangle is *owned* by it: by the first that
@@ -37,7 +40,7 @@ pub struct TexelGeometry {
     height: Vec<f32>,
     /// By texel, 127 for 1.
     facing_up: Vec<i8>,
-    /// Triangle or [`NOBODY`], by texel.
+    /// By texel: its triangle, or [`STAND_IN`] and the texel that stands in for it, or [`NOBODY`].
     owner: Vec<u32>,
     links: Links,
     gutters: Gutters,
@@ -65,7 +68,7 @@ impl TexelGeometry {
         let surface = Surface::new(triangles, world_from_mesh, grid);
         let owners = Ownership::new(triangles, grid);
         let finder = Finder::new(grid, &surface, &owners);
-        let (links, gutters) = (Links::new(&finder), Gutters::new(&finder));
+        let (links, mut gutters) = (Links::new(&finder), Gutters::new(&finder));
         let height = heights(&finder, up);
         let facing: Vec<i8> = front_normals(triangles, world_from_mesh)
             .iter()
@@ -80,9 +83,12 @@ impl TexelGeometry {
                 positive_or(length, mean_length)
             })
         });
+        let lengths = lengths.collect();
+        let mut owner = owners.triangle;
+        gutters.take_stand_ins().for_each(|(texel, other)| owner[texel as usize] = STAND_IN | other);
         Self {
             size,
-            lengths: lengths.collect(),
+            lengths,
             area_mm2: areas.mm2,
             mean_mm2: areas.mean_mm2,
             height,
@@ -91,7 +97,7 @@ impl TexelGeometry {
             links,
             gutters,
             mean_length,
-            owner: owners.triangle,
+            owner,
         }
     }
 
@@ -126,7 +132,7 @@ impl TexelGeometry {
     /// The triangle that a texel lies on, an index into the lists of [`MeshTriangles`].
     #[inline]
     pub fn owner(&self, texel: u32) -> Option<u32> {
-        Some(self.owner[texel as usize]).filter(|&owner| owner != NOBODY)
+        Some(self.owner[texel as usize]).filter(|&owner| owner < STAND_IN)
     }
 
     /// What lies on a side of a texel on the mesh, over seams between islands, too. [`Link::Edge`] where the
@@ -151,7 +157,11 @@ impl TexelGeometry {
     /// off an island (columns plus rows), the one that a way over the mesh straight across the island's
     /// border leads to. Where the mesh ends at that border, the texel of the border. None further out.
     pub fn stand_in(&self, texel: u32) -> Option<u32> {
-        self.owner(texel).map(|_| texel).or_else(|| self.gutters.stand_in(texel))
+        match self.owner[texel as usize] {
+            NOBODY => None,
+            other if other >= STAND_IN => Some(other - STAND_IN),
+            _ => Some(texel),
+        }
     }
 
     /// For a texel that nobody owns but that lies within 2 columns and 2 rows of one that somebody does: the

@@ -89,9 +89,9 @@ impl Gutters {
         gutters
     }
 
-    /// The owned texel that continues the surface at an unowned one.
-    pub(super) fn stand_in(&self, texel: u32) -> Option<u32> {
-        look_up(&self.stand_ins, texel)
+    /// Unowned texels, and the owned ones that continue the surface there; afterwards there are none.
+    pub(super) fn take_stand_ins(&mut self) -> impl Iterator<Item = (u32, u32)> + use<> {
+        std::mem::take(&mut self.stand_ins).into_iter()
     }
 
     /// The owned texel nearest to an unowned one.

@@ -30,22 +30,30 @@ pub(crate) fn soak(water: &mut SurfaceWater, now: &Now, drop: &Drop, scratch: &m
     let axes = [stamp.axis(0, size, wrap), stamp.axis(1, size, wrap)];
     scratch.columns.clear();
     scratch.columns.extend(stamp.texels(0, size, wrap).map(|x| (x, axis_coverage(axes[0], x as i32))));
-    let home = hit_texel(now, drop, size);
+    let (home, mut beside) = (hit_texel(now, drop, size), 0);
     for y in stamp.texels(1, size, wrap) {
-        let row = axis_coverage(axes[1], y as i32);
+        let in_row = share(drop.water_nl, axis_coverage(axes[1], y as i32));
         for &(x, column) in &scratch.columns {
-            let nl = share(drop.water_nl, column, row);
+            let nl = share(in_row, column);
             if nl == 0 {
                 continue;
             }
-            let under = y * size + x;
-            let texel = now.geometry.stand_in(under).unwrap_or(home);
-            let tile = water.add(now, texel, water.units.from_nl(u64::from(nl)));
-            note_arrival(water, now, texel, tile);
+            match now.geometry.stand_in(y * size + x) {
+                Some(texel) => put(water, now, texel, nl),
+                None => beside += nl,
+            }
         }
+    }
+    if beside > 0 {
+        put(water, now, home, beside);
     }
     water.ledger.received += water.units.from_nl(u64::from(drop.water_nl));
     water.rained_at = now.tick;
+}
+
+fn put(water: &mut SurfaceWater, now: &Now, texel: u32, nl: u32) {
+    let tile = water.add(now, texel, water.units.from_nl(u64::from(nl)));
+    note_arrival(water, now, texel, tile);
 }
 
 /// The texel that was hit or, if the middle of the stamp is not on the surface, the one beside it that is.

@@ -96,6 +96,11 @@ impl Tiles {
     }
 }
 
+/// The tile of a column and row of texels.
+pub(crate) fn tile_at(size: u32, x: u32, y: u32) -> u32 {
+    (y / TILE_SIZE) * (size / TILE_SIZE) + x / TILE_SIZE
+}
+
 /// A texel of a tile, by its number within it, row by row.
 pub(crate) fn texel_in(size: u32, tile: u32, local: usize) -> u32 {
     let across = size / TILE_SIZE;
@@ -301,7 +306,7 @@ impl SurfaceWater {
     /// The tile of a texel.
     pub(crate) fn tile_of(&self, texel: u32) -> u32 {
         let (x, y) = (texel % self.size, texel / self.size);
-        (y / TILE_SIZE) * (self.size / TILE_SIZE) + x / TILE_SIZE
+        tile_at(self.size, x, y)
     }
 
     /// Brings a texel to the present and returns what it holds.
@@ -339,7 +344,10 @@ impl SurfaceWater {
 
     /// Adds water to a texel, now; returns its tile. What does not fit is spilled.
     pub(crate) fn add(&mut self, now: &Now, texel: u32, units: u64) -> u32 {
-        self.settle(now, texel);
+        // Under a shower most texels have been brought to the present by the drop before.
+        if self.texels[texel as usize].tick < now.tick {
+            self.settle(now, texel);
+        }
         let tile = self.tile_of(texel);
         let water = &mut self.texels[texel as usize];
         let room = u64::from(u32::MAX - water.film);

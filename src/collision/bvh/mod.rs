@@ -1,6 +1,15 @@
-//! The BVH of one mesh: the only file that knows obvhs.
+//! BVHs: the only folder that knows obvhs.
+//!
+//! | file | casts against |
+//! |---|---|
+//! | `mod` | [`MeshBvh`]: the triangles of a mesh at rest, built once, shared by all that show it |
+//! | `deforming` | [`DeformingBvh`]: the triangles of one surface that is posed, refitted when it moves |
+//! | `boxes` | [`BoxBvh`]: the boxes of all surfaces |
 //!
 //! obvhs has a glam of its own version; values cross over as arrays, so that no lock file can make them differ.
+
+mod boxes;
+mod deforming;
 
 use bevy::prelude::*;
 use obvhs::BvhBuildParams;
@@ -11,7 +20,10 @@ use obvhs::ray::{Ray, RayHit};
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
 
-use super::MeshTriangles;
+use super::{Deformer, MeshTriangles};
+
+pub(super) use boxes::BoxBvh;
+pub(super) use deforming::DeformingBvh;
 
 /// Above this many triangles a faster build is worth a slower cast.
 const FAST_BUILD_TRIANGLES: usize = 200_000;
@@ -22,6 +34,8 @@ pub struct MeshBvh {
     /// In the order of the leaves, so that a leaf reads its triangles in a row.
     leaves: Vec<RtTriangle>,
     triangles: MeshTriangles,
+    /// If the mesh can be posed: how, and the BVH that poses begin with.
+    deforming: Option<(Deformer, DeformingBvh)>,
 }
 
 /// The closest hit of a segment in the space of its mesh.
@@ -45,16 +59,31 @@ impl MeshBvh {
                 v2: c.to_array().into(),
             })
             .collect();
-        let quality = if corners.len() > FAST_BUILD_TRIANGLES {
-            BvhBuildParams::fast_build()
-        } else {
-            BvhBuildParams::medium_build()
-        };
         let boxes: Vec<Aabb> = corners.iter().map(Triangle::aabb).collect();
-        let bvh = build_cwbvh(&padded(boxes), quality, &mut default());
+        let bvh = build_cwbvh(&padded(boxes), quality(corners.len()), &mut default());
         let leaves =
             bvh.primitive_indices.iter().map(|&triangle| (&corners[triangle as usize]).into()).collect();
-        Self { bvh, leaves, triangles }
+        Self { bvh, leaves, triangles, deforming: None }
+    }
+
+    /// Adds what surfaces need that show this mesh skinned or morphed, and the BVH that theirs begin with: once more the
+    /// time of [`Self::build`]. The deformer has to be that of the same mesh.
+    pub fn with_deformer(mut self, deformer: Option<Deformer>) -> Self {
+        self.deforming = deformer.map(|deformer| {
+            let rest = DeformingBvh::build(deformer.corners().clone(), deformer.rest());
+            (deformer, rest)
+        });
+        self
+    }
+
+    /// How the mesh is posed; `None` if it has neither joints nor morph targets.
+    pub fn deformer(&self) -> Option<&Deformer> {
+        self.deforming.as_ref().map(|(deformer, _)| deformer)
+    }
+
+    /// The deformer, and the BVH of the mesh at rest that can follow it.
+    pub(super) fn deforming(&self) -> Option<&(Deformer, DeformingBvh)> {
+        self.deforming.as_ref()
     }
 
     /// The triangles under the BVH.
@@ -84,6 +113,15 @@ impl MeshBvh {
                 triangle: self.bvh.primitive_indices[hit.primitive_id as usize],
             }
         })
+    }
+}
+
+/// How long to think about a tree over so many triangles.
+fn quality(triangles: usize) -> BvhBuildParams {
+    if triangles > FAST_BUILD_TRIANGLES {
+        BvhBuildParams::fast_build()
+    } else {
+        BvhBuildParams::medium_build()
     }
 }
 
@@ -138,53 +176,19 @@ impl Segment {
     }
 }
 
-/// A BVH over boxes, for the instances of a scene.
-#[derive(Default)]
-pub(super) struct BoxBvh {
-    bvh: CwBvh,
-}
-
-impl BoxBvh {
-    pub(super) fn build(boxes: &[(Vec3, Vec3)]) -> Self {
-        if boxes.is_empty() {
-            return Self::default();
-        }
-        let boxes: Vec<Aabb> = boxes
-            .iter()
-            .map(|(min, max)| Aabb { min: min.to_array().into(), max: max.to_array().into() })
-            .collect();
-        Self { bvh: build_cwbvh(&padded(boxes), BvhBuildParams::fastest_build(), &mut default()) }
-    }
-
-    /// Smallest and largest corner of everything; an empty box if there is nothing.
-    pub(super) fn bounds(&self) -> (Vec3, Vec3) {
-        if self.bvh.nodes.is_empty() {
-            return (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        }
-        corners_of(&self.bvh.total_aabb)
-    }
-
-    /// Calls `cast(box, closest)` for the boxes on the segment, with the closest fraction found so far, and
-    /// keeps the fraction it returns, if any.
-    #[inline]
-    pub(super) fn visit(&self, segment: Segment, mut cast: impl FnMut(u32, f32) -> Option<f32>) {
-        let mut hit = RayHit::none();
-        self.bvh.ray_traverse(segment.ray(1.0), &mut hit, |ray, leaf| {
-            let instance = self.bvh.primitive_indices[leaf];
-            cast(instance, ray.tmax - HEAD_START).map_or(f32::INFINITY, |fraction| fraction + HEAD_START)
-        });
-    }
-}
-
 /// Boxes a few rounding errors larger than they are: else a ray through the edge between two flat boxes may miss both.
 fn padded(mut boxes: Vec<Aabb>) -> Vec<Aabb> {
-    let all = boxes.iter().fold(Aabb::INVALID, |all, aabb| all.union(aabb));
-    let pad = 4.0e-6 * all.min.abs().max(all.max.abs()).max_element();
+    let pad = pad_within(&boxes.iter().fold(Aabb::INVALID, |all, aabb| all.union(aabb)));
     for aabb in &mut boxes {
         aabb.min -= pad;
         aabb.max += pad;
     }
     boxes
+}
+
+/// How much larger boxes have to be that lie within this one.
+fn pad_within(all: &Aabb) -> f32 {
+    4.0e-6 * all.min.abs().max(all.max.abs()).max_element()
 }
 
 fn corners_of(aabb: &Aabb) -> (Vec3, Vec3) {
