@@ -20,6 +20,7 @@ fn particle(number: u32) -> Particle {
         volume_nl: number,
         sequence: Sequence(number),
         effect: EffectIndex(0),
+        class: 0,
     }
 }
 

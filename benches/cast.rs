@@ -28,7 +28,8 @@ const BRUTE_TESTS: usize = 4_000_000;
 
 /// A mesh to cast at.
 enum Shape {
-    Glb(&'static [u8]),
+    /// A model of the repository.
+    Glb(&'static str),
     /// Cells along each side.
     Ground(u16),
 }
@@ -72,9 +73,7 @@ fn bumpy_ground(cells: u16) -> MeshTriangles {
 impl Shape {
     fn triangles(&self) -> MeshTriangles {
         match *self {
-            Self::Glb(file) => {
-                MeshTriangles::from_mesh(&glb::mesh(file)).expect("the bunnies have triangles and uvs")
-            }
+            Self::Glb(model) => glb::triangles(model),
             Self::Ground(cells) => bumpy_ground(cells),
         }
     }

@@ -40,7 +40,7 @@ fn ours() -> impl FnMut() -> usize {
     let born: Vec<Particle> = (0..PARTICLES as u32)
         .map(|number| {
             let (position, sequence) = (start(&mut random), Sequence(number));
-            Particle { position, velocity: VELOCITY, lifespan, volume_nl: 1000, sequence, effect }
+            Particle { position, velocity: VELOCITY, lifespan, volume_nl: 1000, sequence, effect, class: 0 }
         })
         .collect();
     world.resource_mut::<Particles>().spawn(born.into_iter());
@@ -67,7 +67,7 @@ fn bare() -> impl FnMut() -> usize {
     let mut positions: Vec<Vec3> = (0..PARTICLES).map(|_| start(&mut random)).collect();
     let mut velocities = vec![VELOCITY; PARTICLES];
     // As the library has it: quadratic drag over mass, g / v_terminal².
-    let drag = 9.81 / scene::water().terminal_speed.powi(2);
+    let drag = 9.81 / scene::water().terminal_speed.unwrap_or_default().powi(2);
     let (wind, dt) = (black_box(Vec3::ZERO), 1.0 / HZ as f32);
     let mut tick = 0;
     move || {

@@ -29,7 +29,7 @@ pub const LIFETIME: f32 = 3.0;
 
 /// A mesh, where it stands, and the maps it gets.
 pub fn surfaces() -> [(Mesh, Vec3, Weatherable); 3] {
-    let maps = |map_size, wrap_u| Weatherable { map_size, wrap_u, wrap_v: Wrap::Clamp };
+    let maps = |map_size, wrap_u| Weatherable { map_size, wrap_u, wrap_v: Wrap::Clamp, ..default() };
     let ground = meshes::ground(Vec2::splat(6.0), UVec2::new(24, 33)).expect("sizes are positive");
     let sphere = meshes::uv_sphere(0.32, 26, 19).expect("sizes are positive");
     [

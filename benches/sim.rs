@@ -72,7 +72,7 @@ impl Sim {
         let world = app.world_mut();
         let mut water = scene::water();
         if !drag {
-            water.terminal_speed = 0.0;
+            water.terminal_speed = Some(0.0);
         }
         let handle = world.resource_mut::<Assets<WeatherEffect>>().add(water.clone());
         let effect = world.resource_mut::<EffectTable>().insert(handle.clone(), water);

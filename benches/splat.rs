@@ -4,7 +4,7 @@
 //! [`CpuMaps::paint`] is all the work of a run without a renderer; [`TileBins::bin`] is what a frame with one
 //! costs the CPU, apart from the upload. The ratio tells how much of the work the GPU takes over.
 
-use bevy_weathering::overlay::{CpuMaps, Splat, TileBins, Weatherable, Wrap};
+use bevy_weathering::overlay::{CpuMaps, Splat, StampAtlas, TileBins, Weatherable, Wrap};
 use criterion::{Criterion, Throughput};
 
 use crate::measure::{self, Contender};
@@ -32,7 +32,7 @@ fn splats() -> Vec<Splat> {
         specular: u32::from_le_bytes([128, 204, 0, 32]),
         bump: 51,
         bump_opacity: 255,
-        pad: [0; 2],
+        ..bytemuck::Zeroable::zeroed()
     };
     (0..SPLATS).map(splat).collect()
 }
@@ -44,17 +44,18 @@ pub fn bench(criterion: &mut Criterion) {
     }
     let splats = splats();
     let wrap = [Wrap::Repeat; 2];
-    let surface = Weatherable { map_size: MAP_SIZE, wrap_u: wrap[0], wrap_v: wrap[1] };
+    let surface =
+        Weatherable { map_size: MAP_SIZE, wrap_u: wrap[0], wrap_v: wrap[1], ..Weatherable::default() };
     let mut maps = CpuMaps::new(&surface);
     let paint = || {
-        maps.paint(&splats);
+        maps.paint(&splats, &StampAtlas::default(), None);
         splats.len()
     };
     let (mut bins, mut headers, mut list) = (TileBins::default(), Vec::new(), Vec::new());
     let bin = || {
         headers.clear();
         list.clear();
-        bins.bin(&splats, MAP_SIZE, wrap, 0, &mut headers, &mut list);
+        bins.bin(&splats, MAP_SIZE, wrap, None, 0, &mut headers, &mut list);
         list.len()
     };
     let mut contenders = [Contender::new("cpu_paint", paint), Contender::new("tile_bins", bin)];

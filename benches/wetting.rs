@@ -13,7 +13,7 @@ use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 use bevy_weathering::WeatheringPlugins;
-use bevy_weathering::collision::{CollisionScene, MeshBvh, MeshTriangles};
+use bevy_weathering::collision::{CollisionScene, MeshBvh};
 use bevy_weathering::overlay::CpuOverlayPlugin;
 use bevy_weathering::prelude::*;
 use bevy_weathering::replay::task_pools;
@@ -50,7 +50,7 @@ fn walls(app: &mut App, count: usize, size: u32) -> Vec<Entity> {
         .map(|i| {
             let upright = Transform::from_xyz(2.0 * i as f32, 2.0, 0.0)
                 .with_rotation(Quat::from_rotation_x(std::f32::consts::FRAC_PI_2));
-            let maps = Weatherable { map_size: size, wrap_u: Wrap::Clamp, wrap_v: Wrap::Clamp };
+            let maps = Weatherable { map_size: size, wrap_u: Wrap::Clamp, wrap_v: Wrap::Clamp, ..default() };
             let wall = (maps, glazed, Mesh3d(mesh.clone()), upright, GlobalTransform::from(upright));
             app.world_mut().spawn(wall).id()
         })
@@ -127,8 +127,7 @@ pub fn bench(_: &mut Criterion) {
         (idle - nothing) / 100.0
     );
 
-    let bunny = glb::mesh(include_bytes!("../assets/models/bunny.glb"));
-    let bvh = std::sync::Arc::new(MeshBvh::build(MeshTriangles::from_mesh(&bunny).unwrap()));
+    let bvh = std::sync::Arc::new(MeshBvh::build(glb::triangles(glb::BUNNY)));
     let wrap = [Wrap::Clamp; 2];
     let points = surface_points(bvh.triangles(), &Affine3A::IDENTITY, 256, wrap);
     let bunny = Entity::from_raw_u32(1).unwrap();

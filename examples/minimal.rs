@@ -20,7 +20,7 @@ fn setup(
     // A hose that points at it. Its water is a `WeatherEffect`: load one, or make one.
     commands.spawn((
         Emitter {
-            effect: effects.add(WeatherEffect { stamp_radius: 0.05, water_mm3: 500.0, ..default() }),
+            effect: effects.add(WeatherEffect { stamp_radius: Some(0.05), volume_mm3: 500.0, ..default() }),
             shape: EmitterShape::Cone { radius: 0.01 },
             spread: 0.05,
             ..default()

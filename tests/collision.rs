@@ -12,7 +12,7 @@ use bevy::mesh::{Indices, PrimitiveTopology};
 use bevy::prelude::*;
 use bevy_weathering::collision::{CollisionScene, MeshBvh, MeshTriangles, SceneHit, TriangleReport};
 
-use crate::common::{Random, read_glb};
+use crate::common::{Random, bunny};
 
 /// How far single precision may be off, in barycentric coordinates and in the fraction of a segment.
 const MARGIN: f64 = 1e-5;
@@ -31,9 +31,11 @@ struct Lists {
 
 impl Lists {
     fn bunny() -> Self {
-        let mesh = read_glb("assets/models/bunny_1000.glb");
-        let indices = mesh.indices.into_iter().map(u32::from).collect();
-        Self { positions: mesh.positions, uvs: mesh.uvs, indices }
+        let triangles = bunny();
+        let positions: Vec<_> = triangles.positions.as_flattened().iter().map(Vec3::to_array).collect();
+        let uvs = triangles.uvs.as_flattened().iter().map(Vec2::to_array).collect();
+        let indices = (0..positions.len() as u32).collect();
+        Self { positions, uvs, indices }
     }
 
     /// A bunny between whose triangles there are many that cannot be hit, and how many of each kind.

@@ -8,11 +8,15 @@ use std::mem::offset_of;
 use bevy::math::{UVec2, Vec3};
 use bevy::render::render_resource::{ShaderType, encase::UniformBuffer};
 use bevy_weathering::material::{GpuDryingPoint, PorousUniform};
-use bevy_weathering::overlay::{RainRing, Splat, SurfaceBatch, TileHeader};
+use bevy_weathering::overlay::{RainRing, Splat, SurfaceBatch, TexelFrame, TileHeader};
+use bevy_weathering::particle::{GpuLook, GpuParticle};
+use bevy_weathering::stamps::StampTexel;
 use bevy_weathering::wetting::gpu::GpuTexelWater;
 use naga::{Expression, Literal, Module, ScalarKind, TypeInner};
 
 const SPLAT: &str = include_str!("../shaders/splat.wgsl");
+const STAMP: &str = include_str!("../shaders/common/stamp.wgsl");
+const PARTICLES: &str = include_str!("../shaders/particles.wgsl");
 const WET_MAP: &str = include_str!("../shaders/common/wet_map.wgsl");
 
 #[derive(Debug, PartialEq)]
@@ -53,11 +57,15 @@ fn wgsl_layout(source: &str, name: &str) -> Layout {
     let TypeInner::Struct { members, span } = &found.inner else { unreachable!("cut out as a struct") };
     let fields = members.iter().map(|member| {
         let inner = &module.types[member.ty].inner;
+        let parts = match inner {
+            TypeInner::Array { base, .. } => &module.types[*base].inner,
+            other => other,
+        };
         Field {
             name: member.name.clone().expect("fields have names"),
             offset: member.offset,
             size: inner.size(module.to_ctx()),
-            kind: inner.scalar_kind().expect("fields are scalars and vectors"),
+            kind: parts.scalar_kind().expect("fields are scalars, and vectors and arrays of them"),
         }
     });
     Layout { fields: fields.collect(), size: *span }
@@ -103,9 +111,41 @@ macro_rules! rust_layout {
 
 #[test]
 fn a_splat_is_the_same_row_on_both_sides() {
-    let rust =
-        rust_layout!(Splat { center, radius, water_nl, tick, diffuse, specular, bump, bump_opacity, pad });
+    let rust = rust_layout!(Splat {
+        center,
+        radius,
+        water_nl,
+        tick,
+        diffuse,
+        specular,
+        bump,
+        bump_opacity,
+        stamp,
+        in_space,
+        row_s,
+        row_t,
+        row_n,
+        origin,
+        reach,
+        axis_s,
+        axis_t,
+        axis_n
+    });
     assert_eq!(wgsl_layout(SPLAT, "Splat"), rust);
+}
+
+#[test]
+fn a_texels_frame_and_a_stamps_texel_are_the_same_rows_on_both_sides() {
+    assert_eq!(wgsl_layout(SPLAT, "TexelFrame"), rust_layout!(TexelFrame { xy, z, normal, along_u }));
+    let stamp = rust_layout!(StampTexel { diffuse, specular, normal, pad });
+    assert_eq!(wgsl_layout(STAMP, "StampTexel"), stamp);
+}
+
+#[test]
+fn a_particle_and_a_look_are_the_same_rows_on_both_sides() {
+    let particle = rust_layout!(GpuParticle { position, kind, velocity, size_age });
+    assert_eq!(wgsl_layout(PARTICLES, "Particle"), particle);
+    assert_eq!(wgsl_layout(PARTICLES, "Look"), rust_layout!(GpuLook { color, exposure, spin, pad }));
 }
 
 #[test]

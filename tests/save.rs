@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::replay::{files_below, number, replay, run};
+use super::replay::{files_below, number, read_report, replay, run};
 
 /// Ten minutes of rain on a roof over a wall and a floor, in wind, with sun.
 const TEN_MINUTES: &str = r#"(
@@ -48,7 +48,16 @@ const TEN_MINUTES: &str = r#"(
     ],
 )"#;
 
-const RAIN: &str = "(water_mm3: 99.9, terminal_speed: 6.5, stamp_radius: 0.03, stamp_radius_jitter: 0.4)";
+/// Paints, too, and leaves dents.
+const RAIN: &str = "(
+    volume_mm3: 99.9,
+    terminal_speed: 6.5,
+    stamp_radius: 0.03,
+    stamp_radius_jitter: 0.4,
+    diffuse: (color: (0.3, 0.2, 0.1), opacity: 0.5),
+    specular: (color: (0.5, 0.6, 0.0), opacity: 0.4),
+    bump: -0.3,
+)";
 
 /// The scenario in a folder of its own.
 fn ten_minutes(folder: &Path) -> std::path::PathBuf {
@@ -88,11 +97,24 @@ fn all_water_is_accounted_for_after_ten_minutes_of_rain() {
 fn a_run_that_was_saved_goes_on_to_the_same_digest() {
     let folder = tempfile::tempdir().unwrap();
     let file = ten_minutes(folder.path());
-    let (kept, again) = (folder.path().join("kept"), folder.path().join("again"));
-    let whole = run(&mut replay(&file, "--no-render --seconds 90")).report();
+    let [kept, again, whole, resumed] =
+        ["kept", "again", "whole", "resumed"].map(|name| folder.path().join(name));
+    run(replay(&file, "--no-render --seconds 90 --out").arg(&whole)).assert_success();
     run(replay(&file, "--no-render --seconds 50 --save-state").arg(&kept)).assert_success();
-    let resumed = run(replay(&file, "--no-render --seconds 90 --resume").arg(&kept)).report();
-    assert_eq!(outcome(&resumed), outcome(&whole));
+    let mut command = replay(&file, "--no-render --seconds 90 --resume");
+    run(command.arg(&kept).arg("--out").arg(&resumed)).assert_success();
+    assert_eq!(outcome(&read_report(&resumed)), outcome(&read_report(&whole)));
+    // It was painted before, and goes on to the same pictures.
+    for map in ["diffuse", "specular", "normal"] {
+        let texels = image::open(kept.join(format!("floor_{map}.png"))).unwrap().into_bytes();
+        assert!(texels.iter().any(|&byte| byte > 0), "{map}");
+    }
+    let (whole, resumed) = (whole.join("maps"), resumed.join("maps"));
+    let names = files_below(&whole);
+    assert_eq!(files_below(&resumed), names);
+    for name in names {
+        assert!(fs::read(whole.join(&name)).unwrap() == fs::read(resumed.join(&name)).unwrap(), "{name}");
+    }
     // What is restored and saved at once is the same to the byte.
     let mut twice = replay(&file, "--no-render --seconds 50");
     run(twice.arg("--resume").arg(&kept).arg("--save-state").arg(&again)).assert_success();
@@ -144,6 +166,9 @@ fn saved_scenes_that_do_not_fit_are_refused_by_file_and_field() {
         ("name: \"roof\"", "name: \"../roof\"", "`surfaces[0].name`"),
         ("size: 64", "size: 65", "`surfaces[0].size`"),
         ("seed: 0", "seeds: 0", "seeds"),
+        ("alive: ", "alive: 1", "`counts.alive`"),
+        ("humidity: 0.3", "humidity: 7.5", "`weather.humidity` is 7.5"),
+        ("temperature_c: 24.0", "temperature_c: NaN", "`weather.temperature_c` is NaN"),
     ] {
         assert!(text.contains(was), "{was}");
         fs::write(&state, text.replacen(was, is, 1)).unwrap();
@@ -157,14 +182,62 @@ fn saved_scenes_that_do_not_fit_are_refused_by_file_and_field() {
     fs::remove_file(&map).unwrap();
     refused(&["floor_film.png"]);
     fs::write(&map, &bytes).unwrap();
+    // Not so long.
+    let mut command = replay(&file, "--no-render --seconds 9.9");
+    run(command.arg("--resume").arg(&kept).arg("--out").arg(&out))
+        .assert_refused(&["`seconds` is 9.9", "at least 10"], &out);
+    // It has a seed.
+    let mut command = replay(&file, "--no-render --seed 7");
+    run(command.arg("--resume").arg(&kept).arg("--out").arg(&out)).assert_refused(&["--seed"], &out);
     // Another scenario.
     fs::write(&file, TEN_MINUTES.replace("rate: 160.0", "rate: 161.0")).unwrap();
     refused(&["state.ron", "`scenario`"]);
-    // A folder that is something else is left alone.
-    let other = folder.path().join("other");
+}
+
+#[test]
+fn folders_that_no_scene_can_be_saved_into_are_refused_before_the_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = ten_minutes(folder.path());
+    let [kept, other, out] = ["kept", "other", "out"].map(|name| folder.path().join(name));
+    run(replay(&file, "--no-render --seconds 1 --save-state").arg(&kept)).assert_success();
+    let state = fs::read(kept.join("state.ron")).unwrap();
     fs::create_dir(&other).unwrap();
     fs::write(other.join("thesis.txt"), "mine").unwrap();
-    let outcome = run(replay(&file, "--no-render --seconds 1 --save-state").arg(&other));
-    assert_eq!(outcome.code, Some(2), "{}", outcome.stderr);
+    let refused = |from: &Path, save: &Path, named: &[&str]| {
+        let mut command = replay(&file, "--no-render --seconds 2");
+        command.current_dir(from).arg("--save-state").arg(save).arg("--out").arg(&out);
+        run(&mut command).assert_refused(named, &out);
+    };
+    refused(folder.path(), &other, &["other", "thesis.txt"]);
+    refused(folder.path(), Path::new("other/../other/."), &["thesis.txt"]);
+    refused(&kept, Path::new("."), &["cannot write .", "runs in"]);
+    for save in [out.as_path(), &out.join("maps"), folder.path()] {
+        refused(folder.path(), save, &["`save`", "of its own"]);
+    }
     assert_eq!(fs::read_to_string(other.join("thesis.txt")).unwrap(), "mine");
+    assert_eq!(fs::read(kept.join("state.ron")).unwrap(), state);
+    // By another name of its own it is saved over.
+    run(replay(&file, "--no-render --seconds 2 --save-state").arg(kept.join("."))).assert_success();
+    assert_ne!(fs::read(kept.join("state.ron")).unwrap(), state);
+    assert_eq!(files_below(folder.path()).iter().filter(|name| name.contains("saving")).count(), 0);
+}
+
+#[test]
+fn pictures_of_before_it_was_saved_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = ten_minutes(folder.path());
+    let (kept, out) = (folder.path().join("kept"), folder.path().join("out"));
+    run(replay(&file, "--no-render --seconds 3 --save-state").arg(&kept)).assert_success();
+    let frame = |number: u32| out.join(format!("frame_{number:05}.png"));
+    fs::create_dir(&out).unwrap();
+    for number in [0, 5, 6, 40] {
+        fs::write(frame(number), "drawn").unwrap();
+    }
+    let mut command = replay(&file, "--no-render --fps 2 --seconds 4 --resume");
+    run(command.arg(&kept).arg("--out").arg(&out)).assert_success();
+    assert_eq!([0, 5, 6, 40].map(|number| frame(number).exists()), [true, true, false, false]);
+    assert_eq!(read_report(&out)["timing"]["frames"], 0);
+    // Without a scene to go on from it is another run.
+    run(replay(&file, "--no-render --fps 2 --seconds 1 --out").arg(&out)).assert_success();
+    assert!(!frame(0).exists() && !frame(5).exists());
 }

@@ -11,7 +11,7 @@ use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::collision::SurfaceImpact;
 use bevy_weathering::material::WeatheredMaterial;
 use bevy_weathering::overlay::{CpuOverlayPlugin, SurfaceTotals};
-use bevy_weathering::particle::{ParticleCounts, Particles, integrate_particles};
+use bevy_weathering::particle::{ParticleCounts, ParticleMaterial, Particles, integrate_particles};
 use bevy_weathering::prelude::*;
 use bevy_weathering::scenario::{Scenario, ScenarioPlugin};
 use bevy_weathering::wetting::SurfaceWater;
@@ -89,8 +89,9 @@ fn ambiguities(app: &mut App) -> Vec<(InternedScheduleLabel, Vec<String>)> {
 #[test]
 fn no_system_is_ambiguous_beside_all_of_bevy() {
     let Some(mut bare) = crate::gpu::app::bare_app() else { return };
-    // Bevy's systems for our material are Bevy's.
+    // Bevy's systems for our materials are Bevy's.
     bare.add_plugins(MaterialPlugin::<WeatheredMaterial>::default());
+    bare.add_plugins(MaterialPlugin::<ParticleMaterial>::default());
     bare.finish();
     bare.cleanup();
     let theirs = ambiguities(&mut bare);

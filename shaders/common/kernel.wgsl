@@ -53,3 +53,56 @@ fn blend_over(source: u32, alpha: u32, under: u32) -> u32 {
 fn slope_color(bump: i32, offset: i32) -> u32 {
     return u32(128 + clamp(bump * offset / 256, -127, 127));
 }
+
+// A row of the matrix from an offset in radii to the stamp's own axes, 1/1024, times the offset in 1/256 radius.
+fn turned(row: vec2<i32>, offset: vec2<i32>) -> i32 {
+    return (row.x * offset.x + row.y * offset.y) >> 10u;
+}
+
+// A row of the matrix from steps of the mesh's space to the stamp's own axes, times the way from the stamp's middle.
+fn framed(row: vec3<i32>, away: vec3<i32>, reach: i32) -> i32 {
+    let near = clamp(away, vec3(-reach), vec3(reach));
+    return (row.x * near.x + row.y * near.y + row.z * near.z) >> 16u;
+}
+
+// Three signed bytes, the first in the lowest: a unit vector, 127 for 1.
+fn unpack_axis(packed: u32) -> vec3<i32> {
+    return vec3<i32>(vec3(packed << 24u, packed << 16u, packed << 8u)) >> vec3(24u);
+}
+
+// Of two unit vectors: 16,129 if they are the same.
+fn dot_axes(a: vec3<i32>, b: vec3<i32>) -> i32 {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+// What stands upright on two unit vectors, 127 for 1.
+fn cross_axes(a: vec3<i32>, b: vec3<i32>) -> vec3<i32> {
+    return (a.yzx * b.zxy - a.zxy * b.yzx) / vec3(127);
+}
+
+// How much of a stamp reaches a texel so far in front of or behind its plane: 0..=256.
+fn depth_part(depth: i32) -> u32 {
+    return u32(clamp((128 - abs(depth)) * 4, 0, 256));
+}
+
+// How much of a stamp a texel gets whose normal has this dot product with that of the stamp: 0..=256.
+fn facing_part(product: i32) -> u32 {
+    return u32(clamp((product - 1613) / 12, 0, 256));
+}
+
+// A channel of a stamp, premultiplied, tinted, over another.
+fn lay_stamp(channel: u32, tint: u32, opacity: u32, weight: u32, under: u32) -> u32 {
+    return (channel * tint * opacity + under * (65025u - weight) + 32512u) / 65025u;
+}
+
+// A slope of a stamp as a premultiplied colour.
+fn stamp_slope(slopes: vec2<i32>, along: vec2<i32>, unit: i32, bump: i32, coverage: u32) -> u32 {
+    let level = (128u * coverage + 127u) / 255u;
+    let slope = (slopes.x * along.x + slopes.y * along.y) / unit * bump / 127;
+    return u32(clamp(i32(level) + slope, 0, i32(coverage)));
+}
+
+// How much a premultiplied colour of this coverage slopes: 0 if it is flat.
+fn slope_of(color: u32, coverage: u32) -> i32 {
+    return i32(color) - i32((128u * coverage + 127u) / 255u);
+}

@@ -1,14 +1,13 @@
 //! A wet version of a base colour texture.
 
-use std::io::Cursor;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageFormat};
 
 use super::spectrum::{Observer, spectrum_from_rgb, wet_spectrum};
 use crate::material::models::lekner_dorf::{LiquidFilm, N_WATER};
 use crate::material::models::{lagarde, lekner_dorf, twomey};
-use crate::output::write_atomic;
+use crate::picture::{PictureError, read_picture, write_picture};
 use crate::scenes::mips::{linear_from_srgb, srgb_from_linear};
 
 /// How a texture gets wet. Porosities are 0..=1: how much of the change is applied.
@@ -50,22 +49,9 @@ pub enum TextureError {
         /// What it is.
         value: f64,
     },
-    /// A file could not be read or written.
-    #[error("{}: {source}", .path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// A file is no picture, too large, or cannot be encoded.
-    #[error("{}: {source}", .path.display())]
-    Image {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: image::ImageError,
-    },
+    /// A file could not be read or written, is no picture, or too large a one.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
 }
 
 impl WetTexture {
@@ -137,32 +123,17 @@ const MAX_SIDE: u32 = 16_384;
 /// Reads a `.png`, up to 16,384 pixels a side.
 ///
 /// # Errors
-/// [`TextureError::File`], [`TextureError::Image`].
+/// [`TextureError::Picture`].
 pub fn read_texture(path: &Path) -> Result<DynamicImage, TextureError> {
-    let file = |source| TextureError::File { path: path.into(), source };
-    let image = |source| TextureError::Image { path: path.into(), source };
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(MAX_SIDE);
-    limits.max_image_height = Some(MAX_SIDE);
-    limits.max_alloc = Some(4 << 30);
-    let mut reader = ImageReader::with_format(
-        std::io::BufReader::new(std::fs::File::open(path).map_err(file)?),
-        ImageFormat::Png,
-    );
-    reader.limits(limits);
-    reader.decode().map_err(image)
+    Ok(read_picture(path, ImageFormat::Png, MAX_SIDE)?)
 }
 
 /// Writes a `.png`, whole or not at all.
 ///
 /// # Errors
-/// [`TextureError::File`], [`TextureError::Image`].
+/// [`TextureError::Picture`].
 pub fn write_texture(path: &Path, texture: &DynamicImage) -> Result<(), TextureError> {
-    let mut bytes = Cursor::new(Vec::new());
-    texture
-        .write_to(&mut bytes, ImageFormat::Png)
-        .map_err(|source| TextureError::Image { path: path.into(), source })?;
-    write_atomic(path, bytes.get_ref()).map_err(|source| TextureError::File { path: path.into(), source })
+    Ok(write_picture(path, texture, ImageFormat::Png)?)
 }
 
 #[cfg(test)]

@@ -27,6 +27,7 @@ use crate::effect::EffectIndex;
 use crate::particle::Sequence;
 use crate::schedule::{RetireParticles, WeatheringSystems, WeatheringTick};
 
+pub(crate) use bvh::BoxOverlaps;
 pub use bvh::{LocalHit, MeshBvh};
 pub use colliders::{ColliderReport, MeshColliders, NotWeatherable, SurfaceCollider};
 pub use deform::{Deformer, DeformingCollider, PosedMesh, Shape};
@@ -51,10 +52,14 @@ pub struct Impact {
     pub uv: Vec2,
     /// Change of u and v for one metre on the surface along their own directions. 0 where uv does not vary.
     pub uv_per_metre: Vec2,
+    /// Unit directions on the surface in which u and v grow; world space, 0 where they do not.
+    pub along: [Vec3; 2],
     /// Velocity at the impact, m/s.
     pub velocity: Vec3,
     /// What hit.
     pub effect: EffectIndex,
+    /// Size class of its drops.
+    pub class: u8,
     /// Water carried, nanolitres.
     pub volume_nl: u32,
 }

@@ -50,6 +50,8 @@ pub struct SceneHit {
     pub uv: Vec2,
     /// Change of u and v for one metre on the surface along their own directions. 0 where uv does not vary.
     pub uv_per_metre: Vec2,
+    /// Unit directions on the surface in which u and v grow; world space, 0 where they do not.
+    pub along: [Vec3; 2],
 }
 
 impl CollisionScene {
@@ -199,6 +201,7 @@ impl Instance {
         let weight_c = ab.cross(point - a).dot(cross) / twice_area_squared;
         let (weight_b, weight_c) = (weight_b.clamp(0.0, 1.0), weight_c.clamp(0.0, 1.0));
         let facing = cross.normalize_or(Vec3::Y);
+        let (uv_per_metre, along) = uv_directions([ab, ac], [uv_b - uv_a, uv_c - uv_a]);
         SceneHit {
             surface: self.surface,
             fraction: hit.fraction,
@@ -206,18 +209,21 @@ impl Instance {
             point,
             normal: if facing.dot(end - start) > 0.0 { -facing } else { facing },
             uv: uv_a + (uv_b - uv_a) * weight_b + (uv_c - uv_a) * weight_c,
-            uv_per_metre: uv_per_metre([ab, ac], [uv_b - uv_a, uv_c - uv_a]),
+            uv_per_metre,
+            along,
         }
     }
 }
 
-/// How fast u and v change along a triangle with these two edges, in space and in uv: 1/|dP/du|, 1/|dP/dv|.
-fn uv_per_metre([ab, ac]: [Vec3; 2], [uv_ab, uv_ac]: [Vec2; 2]) -> Vec2 {
+/// How fast u and v change along a triangle with these two edges, in space and in uv, 1/|dP/du| and 1/|dP/dv|; and the unit
+/// directions in which they grow.
+fn uv_directions([ab, ac]: [Vec3; 2], [uv_ab, uv_ac]: [Vec2; 2]) -> (Vec2, [Vec3; 2]) {
     let area = uv_ab.perp_dot(uv_ac);
-    let along_u = (ab * uv_ac.y - ac * uv_ab.y).length();
-    let along_v = (ac * uv_ab.x - ab * uv_ac.x).length();
+    let along_u = (ab * uv_ac.y - ac * uv_ab.y) * area.signum();
+    let along_v = (ac * uv_ab.x - ab * uv_ac.x) * area.signum();
     let ratio = |length: f32| if length > 0.0 { (area / length).abs() } else { 0.0 };
-    Vec2::new(ratio(along_u), ratio(along_v))
+    let per_metre = Vec2::new(ratio(along_u.length()), ratio(along_v.length()));
+    (per_metre, [along_u.normalize_or_zero(), along_v.normalize_or_zero()])
 }
 
 /// Whether the box around the segment touches the box. Never false for a segment that does.

@@ -32,7 +32,7 @@ pub fn trace_particles(
         return;
     }
     let tick = clock.delta_secs();
-    let Particles { positions, velocities, lifespans, volumes_nl, sequences, effects, .. } =
+    let Particles { positions, velocities, lifespans, volumes_nl, sequences, effects, classes, .. } =
         particles.bypass_change_detection();
     let len = chunk_len(positions.len(), PARALLEL_BATCH);
     let chunks = lifespans.chunks_mut(len).enumerate();
@@ -52,8 +52,10 @@ pub fn trace_particles(
                 normal: hit.normal,
                 uv: hit.uv,
                 uv_per_metre: hit.uv_per_metre,
+                along: hit.along,
                 velocity,
                 effect: effects[index],
+                class: classes[index],
                 volume_nl: volumes_nl[index],
             });
         }
@@ -114,6 +116,7 @@ mod tests {
             volume_nl: number,
             sequence: Sequence(number),
             effect: EffectIndex(0),
+            class: 0,
         };
         world.resource_mut::<Particles>().spawn([particle].into_iter());
     }

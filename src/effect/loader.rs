@@ -1,9 +1,12 @@
 //! Reads `*.effect.ron` and refuses what makes no sense, by field name.
 
+use std::collections::BTreeMap;
+
 use bevy::asset::{AssetLoader, LoadContext, io::Reader};
 use bevy::prelude::*;
 
-use super::{Paint, WeatherEffect};
+use super::{DropSizes, Paint, WeatherEffect};
+use crate::stamps::StampError;
 
 /// Loads a [`WeatherEffect`] from RON.
 #[derive(Default, TypePath)]
@@ -19,6 +22,17 @@ pub enum EffectError {
     /// The file is not RON of the right shape.
     #[error("{0}")]
     Ron(#[from] ron::error::SpannedError),
+    /// An image of its stamps is no PNG, or too large.
+    #[error("image `{file}`: {source}")]
+    Picture {
+        /// As the effect names it.
+        file: String,
+        /// What is wrong.
+        source: image::ImageError,
+    },
+    /// Its stamps cannot be made of these images.
+    #[error("field `stamps`: {0}")]
+    Stamps(#[from] StampError),
     /// A number is not finite or out of range.
     #[error("field `{field}` is {value}, but must be {expected}")]
     Value {
@@ -40,11 +54,21 @@ impl AssetLoader for WeatherEffectLoader {
         &self,
         reader: &mut dyn Reader,
         _settings: &(),
-        _context: &mut LoadContext<'_>,
+        context: &mut LoadContext<'_>,
     ) -> Result<WeatherEffect, EffectError> {
         let mut bytes = Vec::new();
         reader.read_to_end(&mut bytes).await?;
-        WeatherEffect::from_ron(&bytes)
+        let mut effect = WeatherEffect::from_ron(&bytes)?;
+        let mut files = BTreeMap::new();
+        for file in effect.stamps.files() {
+            let unreadable =
+                |error: &dyn std::error::Error| std::io::Error::other(format!("{file}: {error}"));
+            let path = context.path().resolve_embed_str(file).map_err(|error| unreadable(&error))?;
+            let bytes = context.read_asset_bytes(path).await.map_err(|error| unreadable(&error))?;
+            files.insert(file.to_owned(), bytes);
+        }
+        effect.stamp_set = effect.stamps.read(&files)?;
+        Ok(effect)
     }
 
     fn extensions(&self) -> &[&str] {
@@ -58,7 +82,9 @@ impl WeatherEffect {
     /// # Errors
     /// [`EffectError`] names the line or the field.
     pub fn from_ron(bytes: &[u8]) -> Result<Self, EffectError> {
-        let effect: Self = ron::de::from_bytes(bytes)?;
+        let options =
+            ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
+        let effect: Self = options.from_bytes(bytes)?;
         effect.validate()?;
         Ok(effect)
     }
@@ -69,10 +95,15 @@ impl WeatherEffect {
     /// [`EffectError::Value`] for the first field out of range.
     pub fn validate(&self) -> Result<(), EffectError> {
         let zero_to = |field, value: f32, max: f32, expected| within(field, value, 0.0, max, expected);
-        zero_to("water_mm3", self.water_mm3, Self::MAX_VOLUME_MM3, "0 to 1000000 (a litre)")?;
-        zero_to("terminal_speed", self.terminal_speed, 1000.0, "0 to 1000 m/s")?;
+        zero_to("volume_mm3", self.volume_mm3, Self::MAX_VOLUME_MM3, "0 to 1000000 (a litre)")?;
+        zero_to("terminal_speed", self.terminal_speed.unwrap_or(0.0), 1000.0, "0 to 1000 m/s")?;
+        match self.drops {
+            DropSizes::Same(mm) => within("drops", mm, 0.001, 100.0, "0.001 to 100 mm")?,
+            DropSizes::MarshallPalmer(rate) => within("drops", rate, 0.1, 300.0, "0.1 to 300 mm/h")?,
+        }
         within("gravity_scale", self.gravity_scale, -10.0, 10.0, "-10 to 10")?;
-        within("stamp_radius", self.stamp_radius, 1.0e-6, 100.0, "0.000001 to 100 m")?;
+        within("stamp_radius", self.stamp_radius.unwrap_or(1.0), 1.0e-6, 100.0, "0.000001 to 100 m")?;
+        zero_to("stamp_stretch", self.stamp_stretch, 7.0, "0 to 7")?;
         zero_to("stamp_radius_jitter", self.stamp_radius_jitter, 0.9, "0 to 0.9")?;
         self.diffuse.validate("diffuse.color", "diffuse.opacity")?;
         self.specular.validate("specular.color", "specular.opacity")?;
@@ -81,7 +112,8 @@ impl WeatherEffect {
             zero_to("look.color", channel, 1.0, "0 to 1")?;
         }
         zero_to("look.width", self.look.width, 10.0, "0 to 10 m")?;
-        zero_to("look.exposure", self.look.exposure, 10.0, "0 to 10 s")
+        zero_to("look.exposure", self.look.exposure, 10.0, "0 to 10 s")?;
+        zero_to("look.splash", self.look.splash, 10.0, "0 to 10 m")
     }
 }
 
@@ -119,8 +151,8 @@ mod tests {
     #[test]
     fn errors_name_the_field() {
         for (text, field) in [
-            ("(water_mm3: -1.0)", "water_mm3"),
-            ("(water_mm3: NaN)", "water_mm3"),
+            ("(volume_mm3: -1.0)", "volume_mm3"),
+            ("(volume_mm3: NaN)", "volume_mm3"),
             ("(stamp_radius: 0.0)", "stamp_radius"),
             ("(diffuse: (opacity: 2.0))", "diffuse.opacity"),
             ("(bump: inf)", "bump"),

@@ -4,29 +4,48 @@
 //! (`*.effect.ron`); a new effect needs no Rust. Particles do not hold handles: each holds an index into the
 //! [`EffectTable`], whose rows are plain numbers that the hot loops read.
 
+pub mod drops;
 mod loader;
+mod stamp;
 mod table;
+
+use std::sync::Arc;
 
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::stamps::StampSet;
+
+pub use drops::DropSizes;
 pub use loader::{EffectError, WeatherEffectLoader};
+pub use stamp::{StampSource, StampTurn};
 pub use table::{EffectIndex, EffectRow, EffectTable};
 
 /// A kind of particle and the mark it leaves. Loaded from `*.effect.ron`.
 #[derive(Asset, Reflect, Serialize, Deserialize, Debug, Clone, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct WeatherEffect {
-    /// Water a particle carries, in mm³ (1 mm³ is 1 µl). 0 or more, at most [`Self::MAX_VOLUME_MM3`].
-    pub water_mm3: f32,
-    /// Speed at which drag balances gravity, in m/s; 0 switches drag (and wind) off.
-    pub terminal_speed: f32,
+    /// What a particle carries, in mm³ (1 mm³ is 1 µl), if its emitter has no flow of its own. 0 or more, at most
+    /// [`Self::MAX_VOLUME_MM3`].
+    pub volume_mm3: f32,
+    /// How large the drops are that it stands for. Their speed is what air slows them down to, if `terminal_speed` is none.
+    pub drops: DropSizes,
+    /// Speed at which drag balances gravity, in m/s; 0 switches drag (and wind) off. Not given: that of its drops.
+    pub terminal_speed: Option<f32>,
     /// Multiplies gravity: 1 falls, 0 floats.
     pub gravity_scale: f32,
-    /// Radius of the mark on the surface, in metres.
-    pub stamp_radius: f32,
+    /// Shapes of the mark on the surface.
+    pub stamps: StampSource,
+    /// Radius of the mark, in metres. Not given: of a round patch as large as what its drops spread to
+    /// ([`spread_mm`](drops::spread_mm)), all of them together.
+    pub stamp_radius: Option<f32>,
     /// Each stamp's radius is drawn evenly from `stamp_radius` times 1 ± this; 0..=0.9.
     pub stamp_radius_jitter: f32,
+    /// How the mark is turned.
+    pub stamp_turn: StampTurn,
+    /// How much longer than wide a mark may get by an impact aslant, 0..=7: drawn out along the flight by 1 / cos of the angle to
+    /// the normal, up to 1 + this.
+    pub stamp_stretch: f32,
     /// Painted over the surface's colour; linear RGB, 0..=1.
     pub diffuse: Paint,
     /// Painted over the surface's gloss: red = reflectance, green = smoothness (1 - perceptual roughness).
@@ -35,6 +54,10 @@ pub struct WeatherEffect {
     pub bump: f32,
     /// How the particle itself looks.
     pub look: ParticleLook,
+    /// The stamps of `stamps`. Loaded with the effect; for one made in code, see [`Self::with_stamps`].
+    #[serde(skip)]
+    #[reflect(ignore)]
+    pub stamp_set: Option<Arc<StampSet>>,
 }
 
 /// A colour and how much of it a stamp lays over what was there.
@@ -57,26 +80,56 @@ pub struct ParticleLook {
     pub width: f32,
     /// Length of the streak as seconds of flight (exposure time); 0 draws a point.
     pub exposure: f32,
+    /// What it looks like.
+    pub sprite: Sprite,
+    /// Height of the splash where it hits, when it is largest, metres; 0 for none.
+    pub splash: f32,
+}
+
+/// What a particle looks like.
+#[derive(Reflect, Serialize, Deserialize, Debug, Default, Clone, Copy, PartialEq, Eq)]
+pub enum Sprite {
+    /// A drop that falls while the shutter is open.
+    #[default]
+    Streak,
+    /// A drop.
+    Drop,
+    /// A snow crystal.
+    Flake,
+    /// A grain of sand.
+    Grain,
+    /// A lump of earth.
+    Clod,
 }
 
 impl WeatherEffect {
-    /// The most water a particle may carry: a litre.
+    /// The most a particle may carry: a litre.
     pub const MAX_VOLUME_MM3: f32 = 1.0e6;
+
+    /// Whether it leaves colour, gloss or relief.
+    pub fn paints(&self) -> bool {
+        self.diffuse.opacity > 0.0 || self.specular.opacity > 0.0 || self.bump != 0.0
+    }
 }
 
 impl Default for WeatherEffect {
     /// A 2 mm water drop.
     fn default() -> Self {
         Self {
-            water_mm3: 4.19,
-            terminal_speed: 6.55,
+            volume_mm3: 4.19,
+            drops: DropSizes::default(),
+            terminal_speed: None,
             gravity_scale: 1.0,
-            stamp_radius: 0.005,
+            stamps: StampSource::default(),
+            stamp_radius: None,
             stamp_radius_jitter: 0.0,
+            stamp_turn: StampTurn::default(),
+            stamp_stretch: 0.0,
             diffuse: Paint::default(),
             specular: Paint::default(),
             bump: 0.0,
             look: ParticleLook::default(),
+            stamp_set: None,
         }
     }
 }
@@ -89,9 +142,14 @@ impl Default for Paint {
 
 impl Default for ParticleLook {
     fn default() -> Self {
-        Self { color: [0.75, 0.82, 0.9, 0.35], width: 0.004, exposure: 0.012 }
+        let color = [0.75, 0.82, 0.9, 0.35];
+        Self { color, width: 0.004, exposure: 0.012, sprite: Sprite::Streak, splash: 0.0 }
     }
 }
+
+/// In `PreUpdate`: the [`EffectTable`] follows its assets.
+#[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct RefreshEffects;
 
 /// Registers the asset, its loader and the [`EffectTable`].
 pub struct EffectPlugin;
@@ -102,6 +160,6 @@ impl Plugin for EffectPlugin {
             .register_asset_loader(WeatherEffectLoader)
             .register_asset_reflect::<WeatherEffect>()
             .init_resource::<EffectTable>()
-            .add_systems(PreUpdate, table::refresh_effect_table);
+            .add_systems(PreUpdate, table::refresh_effect_table.in_set(RefreshEffects));
     }
 }

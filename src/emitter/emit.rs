@@ -4,9 +4,11 @@ use bevy::prelude::*;
 use rand_pcg::Pcg32;
 use serde::{Deserialize, Serialize};
 
+use super::shape::unit;
 use super::{EmissionSeed, Emitter};
 use crate::clock::WeatheringClock;
-use crate::effect::EffectTable;
+use crate::effect::drops::SIZE_CLASSES;
+use crate::effect::{DropSizes, EffectTable};
 use crate::particle::{Lifespan, Particle, ParticleConfig, ParticleCounts, Particles, Sequence, WaterCounts};
 
 /// What an [`Emitter`] has sent out and still owes.
@@ -110,7 +112,9 @@ pub fn emit_particles(
             continue;
         }
         let Some(index) = effects.index_of(&emitter.effect) else { continue };
-        let Some(effect) = effects.get(index) else { continue };
+        let Some(row) = effects.row(index) else { continue };
+        let Some(effect) = &row.effect else { continue };
+        let volume_mm3 = emitter.particle_mm3(effect);
 
         let state = &mut *state;
         // Emitters that share a number do not send the same particles.
@@ -126,9 +130,14 @@ pub fn emit_particles(
         let ticks_left = (emitter.lifetime * clock.hz() as f32).ceil().max(1.0);
         let ticks_left = ticks_left.min(f32::from(Lifespan::MAX_TICKS)) as u16;
         for i in 0..count {
-            let (position, velocity) = emitter.sample(&world_from_emitter, &mut rng);
+            let class = match effect.drops {
+                DropSizes::Same(_) => 0,
+                DropSizes::MarshallPalmer(_) => (unit(&mut rng) * SIZE_CLASSES as f32) as u8,
+            };
+            let fall_speed = row.terminal_speed(usize::from(class));
+            let (position, velocity) = emitter.sample(&world_from_emitter, &mut rng, fall_speed);
             let born_at = ((first + f64::from(i) * interval) * 65_536.0).clamp(0.0, 65_535.0) as u16;
-            let volume_nl = state.water_nl(effect.water_mm3);
+            let volume_nl = state.water_nl(volume_mm3);
             water.emitted_nl += u64::from(volume_nl);
             let lifespan = Lifespan { ticks_left, born_at };
             new.push(|sequence| Particle {
@@ -138,6 +147,7 @@ pub fn emit_particles(
                 volume_nl,
                 sequence,
                 effect: index,
+                class,
             });
         }
         state.rng = Some(rng);
@@ -220,7 +230,7 @@ mod tests {
 
     #[test]
     fn water_adds_up_to_the_flow() {
-        let mut world = world(60, WeatherEffect { water_mm3: 4.1887903, ..default() });
+        let mut world = world(60, WeatherEffect { volume_mm3: 4.1887903, ..default() });
         world.spawn(Emitter { rate: 1000.0, ..default() });
         run(&mut world, 600);
         let total: u64 = world.resource::<Particles>().volumes_nl().iter().copied().map(u64::from).sum();

@@ -27,7 +27,9 @@ pub struct Emitter {
     pub rate: f32,
     /// Where on the emitter they start.
     pub shape: EmitterShape,
-    /// Initial speed in m/s along the emitter's forward axis.
+    /// How much it sends out; what a particle carries follows from that.
+    pub flow: Flow,
+    /// Initial speed in m/s along the emitter's forward axis. 0 under a sky: as fast as its drops fall.
     pub speed: f32,
     /// Half-angle in radians of the cone of directions, 0..=π.
     pub spread: f32,
@@ -48,6 +50,7 @@ impl Default for Emitter {
             effect: Handle::default(),
             rate: 1000.0,
             shape: EmitterShape::Point,
+            flow: Flow::Effect,
             speed: 5.0,
             spread: 0.0,
             lifetime: 5.0,
@@ -55,6 +58,45 @@ impl Default for Emitter {
             enabled: true,
         }
     }
+}
+
+/// How much an emitter sends out.
+#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Default)]
+pub enum Flow {
+    /// Each particle what its effect says.
+    #[default]
+    Effect,
+    /// So much on the ground below a [`EmitterShape::Sky`], mm/h; from other shapes what the effect says.
+    MmPerHour(f32),
+    /// A hose.
+    LitresPerMinute(f32),
+}
+
+impl Emitter {
+    /// A hose of so many litres a minute through a nozzle of this diameter, metres: 15 l/min through 6 mm leave it at 8.8 m/s.
+    pub fn hose(effect: Handle<WeatherEffect>, litres_per_minute: f32, nozzle: f32) -> Self {
+        let speed = nozzle_speed(litres_per_minute, nozzle / 2.0);
+        let shape = EmitterShape::Cone { radius: nozzle / 2.0 };
+        Self { effect, flow: Flow::LitresPerMinute(litres_per_minute), shape, speed, ..Self::default() }
+    }
+
+    /// What a particle carries, mm³.
+    pub fn particle_mm3(&self, effect: &WeatherEffect) -> f32 {
+        let mm3_per_second = match (self.flow, self.shape) {
+            (Flow::MmPerHour(rate), EmitterShape::Sky { half_size }) => {
+                // A millimetre on a square metre is a litre.
+                rate * 4.0 * half_size.x * half_size.y * 1.0e6 / 3600.0
+            }
+            (Flow::LitresPerMinute(litres), _) => litres * 1.0e6 / 60.0,
+            _ => return effect.volume_mm3,
+        };
+        (mm3_per_second / self.rate.max(1e-6)).clamp(0.0, WeatherEffect::MAX_VOLUME_MM3)
+    }
+}
+
+/// Speed, m/s, at which so many litres a minute leave a nozzle of this radius, metres.
+pub fn nozzle_speed(litres_per_minute: f32, radius: f32) -> f32 {
+    litres_per_minute * 1.0e-3 / 60.0 / (std::f32::consts::PI * (radius * radius).max(1e-12))
 }
 
 /// Where on an emitter particles start. Lengths in metres, in the emitter's space; forward is -Z.

@@ -32,7 +32,13 @@ fn in_cone(rng: &mut Pcg32, spread: f32) -> Vec3 {
 
 impl Emitter {
     /// Start position and velocity of one particle, in world space. Scale moves positions, not speeds.
-    pub(super) fn sample(&self, world_from_emitter: &Affine3A, rng: &mut Pcg32) -> (Vec3, Vec3) {
+    /// `fall_speed`: m/s, for those that begin as fast as they fall.
+    pub(super) fn sample(
+        &self,
+        world_from_emitter: &Affine3A,
+        rng: &mut Pcg32,
+        fall_speed: f32,
+    ) -> (Vec3, Vec3) {
         let rotate = |direction: Vec3| {
             world_from_emitter.transform_vector3(direction).normalize_or(Vec3::NEG_Z) * self.speed
         };
@@ -56,7 +62,7 @@ impl Emitter {
                 let offset = Vec3::new(signed_unit(rng) * half_size.x, 0.0, signed_unit(rng) * half_size.y);
                 let cone = in_cone(rng, self.spread);
                 let down = Vec3::new(cone.x, cone.z, cone.y);
-                (place(Vec3::ZERO) + offset, down * self.speed)
+                (place(Vec3::ZERO) + offset, down * if self.speed > 0.0 { self.speed } else { fall_speed })
             }
         }
     }
@@ -82,7 +88,7 @@ mod tests {
             let axis = if matches!(shape, EmitterShape::Sky { .. }) { Vec3::NEG_Y } else { Vec3::NEG_Z };
             let mut mean = Vec3::ZERO;
             for _ in 0..4000 {
-                let (position, velocity) = emitter.sample(&Affine3A::IDENTITY, &mut rng);
+                let (position, velocity) = emitter.sample(&Affine3A::IDENTITY, &mut rng, 0.0);
                 assert!((velocity.length() - 2.0).abs() < 1e-5, "{shape:?}");
                 assert!(velocity.normalize().dot(axis) >= 0.3f32.cos() - 1e-5, "{shape:?} {velocity}");
                 let inside = match shape {
@@ -112,7 +118,7 @@ mod tests {
             bevy::math::Quat::from_rotation_y(std::f32::consts::FRAC_PI_2),
             Vec3::Y,
         );
-        let (position, velocity) = emitter.sample(&turned, &mut Pcg32::new(0, 0));
+        let (position, velocity) = emitter.sample(&turned, &mut Pcg32::new(0, 0), 0.0);
         assert_eq!(position, Vec3::Y);
         assert!((velocity - Vec3::NEG_X * 3.0).length() < 1e-5, "{velocity}");
     }

@@ -2,9 +2,15 @@
 
 use bevy::prelude::*;
 
-use super::kernel::{axis_offset, blend_over, falloff, slope_color, stamp_alpha};
-use super::{Splat, SplatQueue, Weatherable, Wrap};
+use super::frames::{Frames, SurfaceFrames, TexelFrame};
+use super::kernel::{
+    axis_offset, blend_over, depth_part, dot_axes, facing_part, falloff, framed, lay_stamp, slope_color,
+    slope_of, stamp_alpha, stamp_slope, turned, unpack_axis,
+};
+use super::{Splat, SplatQueue, StampAtlas, TILE_SIZE, Weatherable, Wrap};
 use crate::schedule::{WeatheringSystems, WeatheringTick};
+use crate::stamps::StampTexel;
+use crate::stamps::sample::{mix4, on_stamp, stamp_corners};
 
 /// The maps of a surface in main memory. Rows from v = 0 on, `size` texels each.
 #[derive(Component, Debug, Clone, PartialEq, Eq)]
@@ -35,42 +41,121 @@ impl CpuMaps {
         }
     }
 
-    /// Paints splats, one after the other.
-    pub fn paint(&mut self, splats: &[Splat]) {
+    /// Paints splats, one after the other. `frames`: where the texels lie; without them, splats in space are left out.
+    pub fn paint(&mut self, splats: &[Splat], stamps: &StampAtlas, frames: Option<&SurfaceFrames>) {
         for splat in splats {
-            self.paint_one(splat);
+            if splat.in_space == 0 {
+                self.paint_on_map(splat, stamps);
+            } else if let Some(frames) = frames {
+                self.paint_in_space(splat, stamps, &frames.0);
+            }
         }
     }
 
-    fn paint_one(&mut self, splat: &Splat) {
+    fn paint_on_map(&mut self, splat: &Splat, stamps: &StampAtlas) {
         let axes = [splat.axis(0, self.size, self.wrap), splat.axis(1, self.size, self.wrap)];
+        let stamp = stamps.stamp(splat.stamp);
         for y in splat.texels(1, self.size, self.wrap) {
             let row_offset = axis_offset(axes[1], y as i32);
             for x in splat.texels(0, self.size, self.wrap) {
                 let offset = [axis_offset(axes[0], x as i32), row_offset];
-                self.color_texel((y * self.size + x) as usize, splat, offset);
+                self.paint_texel((y * self.size + x) as usize, splat, stamp, Place::on_map(splat, offset));
             }
         }
     }
 
-    fn color_texel(&mut self, texel: usize, splat: &Splat, offset: [i32; 2]) {
-        let dome = falloff(offset);
-        let over = |under: &mut [u8; 4], color: [u32; 3], opacity: u32| {
-            let alpha = stamp_alpha(opacity, dome);
-            for (channel, source) in under.iter_mut().zip([color[0], color[1], color[2], 255]) {
-                *channel = blend_over(source, alpha, u32::from(*channel)) as u8;
+    fn paint_in_space(&mut self, splat: &Splat, stamps: &StampAtlas, frames: &Frames) {
+        let stamp = stamps.stamp(splat.stamp);
+        let across = self.size / TILE_SIZE;
+        frames.tiles_near(splat.origin, splat.reach / 2, |tile| {
+            for local in 0..TILE_SIZE * TILE_SIZE {
+                let (x, y) = (tile % across * TILE_SIZE, tile / across * TILE_SIZE);
+                let texel = ((y + local / TILE_SIZE) * self.size + x + local % TILE_SIZE) as usize;
+                if let Some(place) = Place::in_space(splat, &frames.texels[texel]) {
+                    self.paint_texel(texel, splat, stamp, place);
+                }
+            }
+        });
+    }
+
+    fn paint_texel(&mut self, texel: usize, splat: &Splat, stamp: &[StampTexel], place: Place) {
+        let unpack = |packed: u32| packed.to_le_bytes().map(u32::from);
+        let (paint, gloss) = (unpack(splat.diffuse), unpack(splat.specular));
+        let part = |opacity: u32| (opacity * place.part) >> 8;
+        let (diffuse, specular, normal) =
+            (&mut self.diffuse[texel], &mut self.specular[texel], &mut self.normal[texel]);
+        if splat.stamp == 0 {
+            let dome = falloff(place.offset);
+            let over = |under: &mut [u8; 4], [r, g, b, opacity]: [u32; 4]| {
+                let alpha = stamp_alpha(part(opacity), dome);
+                for (channel, source) in under.iter_mut().zip([r, g, b, 255]) {
+                    *channel = blend_over(source, alpha, u32::from(*channel)) as u8;
+                }
+            };
+            over(diffuse, paint);
+            over(specular, gloss);
+            let along = |row: [i32; 2]| (place.offset[0] * row[0] + place.offset[1] * row[1]) / place.unit;
+            let slopes = place.along.map(|row| slope_color(splat.bump, along(row)));
+            over(normal, [slopes[0], slopes[1], 255, splat.bump_opacity]);
+            return;
+        }
+        if stamp.is_empty() || !on_stamp(place.offset) {
+            return;
+        }
+        let corners = stamp_corners(place.offset);
+        let [a, b, c, d] = corners.texels.map(|corner| stamp[corner as usize]);
+        let [wx, wy] = corners.weights;
+        let over = |under: &mut [u8; 4], channels: [u32; 4], tint: [u32; 3], opacity: u32| {
+            let weight = channels[3] * opacity;
+            for ((under, channel), tint) in
+                under.iter_mut().zip(channels).zip([tint[0], tint[1], tint[2], 255])
+            {
+                *under = lay_stamp(channel, tint, opacity, weight, u32::from(*under)) as u8;
             }
         };
-        let unpack = |paint: u32| {
-            let [r, g, b, opacity] = paint.to_le_bytes().map(u32::from);
-            ([r, g, b], opacity)
-        };
-        let (color, opacity) = unpack(splat.diffuse);
-        over(&mut self.diffuse[texel], color, opacity);
-        let (color, opacity) = unpack(splat.specular);
-        over(&mut self.specular[texel], color, opacity);
-        let slopes = [slope_color(splat.bump, offset[0]), slope_color(splat.bump, offset[1]), 255];
-        over(&mut self.normal[texel], slopes, splat.bump_opacity);
+        let tint = |[r, g, b, _]: [u32; 4]| [r, g, b];
+        let color = unpack(mix4(a.diffuse, b.diffuse, c.diffuse, d.diffuse, wx, wy));
+        over(diffuse, color, tint(paint), part(paint[3]));
+        let color = unpack(mix4(a.specular, b.specular, c.specular, d.specular, wx, wy));
+        over(specular, color, tint(gloss), part(gloss[3]));
+        let [r, g, _, coverage] = unpack(mix4(a.normal, b.normal, c.normal, d.normal, wx, wy));
+        let slopes = [slope_of(r, coverage), slope_of(g, coverage)];
+        let [u, v] = place.along.map(|row| stamp_slope(slopes, row, place.unit, splat.bump, coverage));
+        over(normal, [u, v, coverage, coverage], [255; 3], part(splat.bump_opacity));
+    }
+}
+
+/// Where a texel lies on a stamp.
+struct Place {
+    /// Along the stamp's own axes, 1/256 radius.
+    offset: [i32; 2],
+    /// For u and v: their parts along the stamp's axes, in `unit`s.
+    along: [[i32; 2]; 2],
+    unit: i32,
+    /// How much of the stamp reaches it, 0..=256.
+    part: u32,
+}
+
+impl Place {
+    fn on_map(splat: &Splat, offset: [i32; 2]) -> Self {
+        if splat.stamp == 0 {
+            return Self { offset, along: [[1, 0], [0, 1]], unit: 1, part: 256 };
+        }
+        let [[ss, st, _], [ts, tt, _]] = [splat.row_s, splat.row_t];
+        let offset = [turned([ss, st], offset), turned([ts, tt], offset)];
+        Self { offset, along: [[ss, ts], [st, tt]], unit: 1024, part: 256 }
+    }
+
+    fn in_space(splat: &Splat, frame: &TexelFrame) -> Option<Self> {
+        let [x, y, z] = frame.place()?;
+        let [from_x, from_y, from_z] = splat.origin;
+        let away = [x - from_x, y - from_y, z - from_z];
+        let [s, t, n] = [splat.row_s, splat.row_t, splat.row_n].map(|row| framed(row, away, splat.reach));
+        let facing = facing_part(dot_axes(unpack_axis(frame.normal), unpack_axis(splat.axis_n)));
+        let part = (depth_part(n) * facing) >> 8;
+        let axes = [splat.axis_s, splat.axis_t].map(unpack_axis);
+        let along = frame.along().map(|along| axes.map(|axis| dot_axes(along, axis)));
+        (part > 0 && on_stamp([s, t])).then_some(Self { offset: [s, t], along, unit: 127 * 127, part })
     }
 }
 
@@ -107,10 +192,13 @@ fn add_cpu_maps(
 }
 
 /// Empties every queue into its surface's maps. Surfaces do not share texels, so they are painted in parallel.
-pub fn paint_on_cpu(mut surfaces: Query<(&mut CpuMaps, &mut SplatQueue)>) {
-    surfaces.par_iter_mut().for_each(|(mut maps, mut queue)| {
+pub fn paint_on_cpu(
+    stamps: Res<StampAtlas>,
+    mut surfaces: Query<(&mut CpuMaps, &mut SplatQueue, Option<&SurfaceFrames>)>,
+) {
+    surfaces.par_iter_mut().for_each(|(mut maps, mut queue, frames)| {
         if !queue.is_empty() {
-            maps.paint(queue.splats());
+            maps.paint(queue.splats(), &stamps, frames);
             queue.clear();
         }
     });
@@ -122,7 +210,7 @@ mod tests {
     use crate::overlay::splat::pack_unorm;
 
     fn maps(wrap: Wrap) -> CpuMaps {
-        CpuMaps::new(&Weatherable { map_size: 64, wrap_u: wrap, wrap_v: wrap })
+        CpuMaps::new(&Weatherable { map_size: 64, wrap_u: wrap, wrap_v: wrap, ..default() })
     }
 
     fn splat(center: [i32; 2]) -> Splat {
@@ -135,15 +223,15 @@ mod tests {
             specular: pack_unorm([0.5, 0.9, 0.0, 1.0]),
             bump: 60,
             bump_opacity: 255,
-            pad: [0; 2],
+            ..bytemuck::Zeroable::zeroed()
         }
     }
 
     #[test]
     fn a_stamp_in_the_corner_is_the_stamp_in_the_middle() {
         let (mut corner, mut middle) = (maps(Wrap::Repeat), maps(Wrap::Repeat));
-        corner.paint(&[splat([100, 30])]);
-        middle.paint(&[splat([32 * 256 + 100, 32 * 256 + 30])]);
+        corner.paint(&[splat([100, 30])], &StampAtlas::default(), None);
+        middle.paint(&[splat([32 * 256 + 100, 32 * 256 + 30])], &StampAtlas::default(), None);
         for y in 0..64 {
             for x in 0..64 {
                 let here = y * 64 + x;
@@ -159,7 +247,7 @@ mod tests {
     fn texels_out_of_reach_stay_zero() {
         for (wrap, center) in [(Wrap::Clamp, [0, 64 * 256 - 1]), (Wrap::Repeat, [4000, 9000])] {
             let mut maps = maps(wrap);
-            maps.paint(&[splat(center)]);
+            maps.paint(&[splat(center)], &StampAtlas::default(), None);
             for texel in 0..64 * 64 {
                 let (x, y) = (texel % 64, texel / 64);
                 let reach =
@@ -176,9 +264,9 @@ mod tests {
     fn splitting_a_batch_changes_nothing() {
         let splats: Vec<Splat> = (0..40).map(|i| splat([i * 311 % 16_384, i * 977 % 16_384])).collect();
         let (mut at_once, mut split) = (maps(Wrap::Repeat), maps(Wrap::Repeat));
-        at_once.paint(&splats);
+        at_once.paint(&splats, &StampAtlas::default(), None);
         for part in splats.chunks(7) {
-            split.paint(part);
+            split.paint(part, &StampAtlas::default(), None);
         }
         assert_eq!(at_once, split);
     }

@@ -3,13 +3,14 @@
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::splat::pack_unorm;
-use super::{Splat, TexelArea, Weatherable};
+use super::frames::{FramesWork, SurfaceFrames, measure_frames, release_frames};
+use super::stamping::{Site, splat_from_impact};
+use super::{Splat, StampAtlas, StampSpace, TexelArea, Weatherable};
 use crate::clock::WeatheringClock;
-use crate::collision::{Impact, Impacts, SurfaceCollider};
-use crate::effect::{EffectTable, WeatherEffect};
+use crate::collision::{Impacts, SurfaceCollider};
+use crate::effect::{EffectTable, RefreshEffects};
 use crate::schedule::{WeatheringSystems, WeatheringTick};
-use crate::wetting::{Drop, DropQueue, SurfaceWater};
+use crate::wetting::{Drop, DropQueue, MeasureSurfaces, SurfaceWater};
 
 /// Splats of a surface that nobody has painted yet, in the order of their impacts. A frame may hold any number of
 /// ticks: each adds its own; the painter empties it.
@@ -73,6 +74,10 @@ pub struct SurfaceTotals {
     pub water_nl: u64,
 }
 
+/// In `PreUpdate`, after surfaces have learnt their shape: stamps get their numbers, and surfaces learn where their texels lie.
+#[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct PrepareStamps;
+
 /// Gives surfaces their queues and fills them.
 pub struct DepositPlugin;
 
@@ -81,10 +86,20 @@ impl Plugin for DepositPlugin {
         app.register_type::<Weatherable>()
             .register_type::<SurfaceTotals>()
             .register_type::<SurfaceTraces>()
+            .init_resource::<StampAtlas>()
             .register_required_components::<Weatherable, SplatQueue>()
             .register_required_components::<Weatherable, SurfaceTotals>()
             .register_required_components::<Weatherable, SurfaceTraces>()
+            .register_type::<StampSpace>()
+            .init_resource::<FramesWork>()
+            .add_observer(release_frames)
             .add_systems(PreUpdate, measure_texels)
+            .add_systems(
+                PreUpdate,
+                (number_stamps.after(RefreshEffects), measure_frames.after(MeasureSurfaces))
+                    .chain()
+                    .in_set(PrepareStamps),
+            )
             .add_systems(PostUpdate, note_traces)
             .add_systems(WeatheringTick, deposit_splats.in_set(WeatheringSystems::Deposit));
     }
@@ -118,19 +133,35 @@ pub(crate) fn note_traces(
     }
 }
 
+type Stamped = (
+    &'static Weatherable,
+    &'static mut SplatQueue,
+    &'static mut SurfaceTotals,
+    Option<&'static mut DropQueue>,
+    Option<&'static SurfaceFrames>,
+    Option<&'static GlobalTransform>,
+);
+
 /// Turns this tick's impacts into splats, in their order.
 pub fn deposit_splats(
     clock: Res<WeatheringClock>,
     impacts: Res<Impacts>,
     effects: Res<EffectTable>,
-    mut surfaces: Query<(&Weatherable, &mut SplatQueue, &mut SurfaceTotals, Option<&mut DropQueue>)>,
+    mut surfaces: Query<Stamped>,
 ) {
     for impact in &impacts.0 {
-        let Ok((surface, mut queue, mut totals, drops)) = surfaces.get_mut(impact.surface) else { continue };
-        let Some(effect) = effects.get(impact.effect) else { continue };
+        let Ok((surface, mut queue, mut totals, drops, frames, transform)) = surfaces.get_mut(impact.surface)
+        else {
+            continue;
+        };
+        let Some(row) = effects.row(impact.effect) else { continue };
+        let Some(effect) = &row.effect else { continue };
         totals.impacts += 1;
         totals.water_nl += u64::from(impact.volume_nl);
-        let splat = splat_from_impact(impact, effect, surface, clock.tick());
+        let site = frames
+            .zip(transform)
+            .map(|(frames, transform)| Site { frames: &frames.0, world_from_mesh: transform.affine() });
+        let splat = splat_from_impact(impact, row, effect, surface, site.as_ref(), clock.tick());
         queue.push(splat);
         if let Some(mut drops) = drops
             && splat.water_nl > 0
@@ -140,38 +171,23 @@ pub fn deposit_splats(
     }
 }
 
-/// The stamp an impact leaves: as large in metres as the effect says, wherever the uvs are wide or narrow.
-pub fn splat_from_impact(impact: &Impact, effect: &WeatherEffect, surface: &Weatherable, tick: u32) -> Splat {
-    let size = surface.texels();
-    let varied = 1.0 + effect.stamp_radius_jitter * signed_hash(impact.sequence.0);
-    let radius_uv = impact.uv_per_metre * (effect.stamp_radius * varied);
-    let [r, g, b] = effect.diffuse.color;
-    let [reflectance, smoothness, unused] = effect.specular.color;
-    Splat {
-        center: Splat::center_from_uv(impact.uv, size, surface.wrap()),
-        radius: Splat::radius_from_uv(radius_uv, size),
-        water_nl: impact.volume_nl,
-        tick,
-        diffuse: pack_unorm([r, g, b, effect.diffuse.opacity]),
-        specular: pack_unorm([reflectance, smoothness, unused, effect.specular.opacity]),
-        bump: (effect.bump * 127.0).round() as i32,
-        bump_opacity: if effect.bump == 0.0 { 0 } else { 255 },
-        pad: [0; 2],
+/// Gives the stamps of new effects their numbers.
+pub(crate) fn number_stamps(mut effects: ResMut<EffectTable>, mut atlas: ResMut<StampAtlas>) {
+    for (numbers, set) in effects.bypass_change_detection().without_stamps() {
+        match atlas.add(set) {
+            Some(first) => *numbers = (first, set.variants.len() as u32),
+            None => {
+                warn_once!("more than {} stamps: some effects paint domes instead", StampAtlas::MAX_STAMPS)
+            }
+        }
     }
-}
-
-/// An even number in [-1, 1) from an integer: the output permutation of PCG (O'Neill 2014) as a hash.
-fn signed_hash(number: u32) -> f32 {
-    let state = number.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
-    ((word >> 22) ^ word) as f32 / (1u32 << 31) as f32 - 1.0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effect::EffectIndex;
-    use crate::overlay::Wrap;
+    use crate::collision::Impact;
+    use crate::effect::{EffectIndex, WeatherEffect};
     use crate::particle::Sequence;
 
     fn impact(surface: Entity, number: u32) -> Impact {
@@ -183,8 +199,10 @@ mod tests {
             normal: Vec3::Y,
             uv: Vec2::new(0.5, 1.25),
             uv_per_metre: Vec2::new(0.5, 0.25),
+            along: [Vec3::X, Vec3::Z],
             velocity: Vec3::NEG_Y,
             effect: EffectIndex(0),
+            class: 0,
             volume_nl: 4189,
         }
     }
@@ -196,7 +214,7 @@ mod tests {
         clock.advance();
         world.insert_resource(clock);
         let mut effects = EffectTable::default();
-        effects.insert(Handle::default(), WeatherEffect { stamp_radius: 0.125, ..default() });
+        effects.insert(Handle::default(), WeatherEffect { stamp_radius: Some(0.125), ..default() });
         world.insert_resource(effects);
         let mut spawn =
             || world.spawn((Weatherable::default(), SplatQueue::default(), SurfaceTotals::default())).id();
@@ -220,20 +238,5 @@ mod tests {
         assert_eq!(splat.center, [256 * 256, 128 * 256]);
         assert_eq!(splat.radius, [32 * 256, 16 * 256]);
         assert_eq!((splat.water_nl, splat.tick), (4189, 1));
-    }
-
-    #[test]
-    fn clamped_surfaces_keep_stamps_at_their_edge() {
-        let surface = Weatherable { map_size: 64, wrap_u: Wrap::Clamp, wrap_v: Wrap::Clamp };
-        let splat =
-            splat_from_impact(&impact(Entity::PLACEHOLDER, 0), &WeatherEffect::default(), &surface, 1);
-        assert_eq!(splat.center, [32 * 256, 64 * 256 - 1]);
-        assert_eq!(splat.radius, [Splat::MIN_RADIUS; 2]);
-    }
-
-    #[test]
-    fn jitter_is_even_and_within_bounds() {
-        let mean: f32 = (0..10_000).map(signed_hash).inspect(|h| assert!(h.abs() <= 1.0)).sum::<f32>() / 1e4;
-        assert!(mean.abs() < 0.02, "{mean}");
     }
 }

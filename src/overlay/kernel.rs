@@ -120,6 +120,64 @@ pub fn slope_color(bump: i32, offset: i32) -> u32 {
     (128 + (bump * offset / 256).clamp(-127, 127)) as u32
 }
 
+/// A row of the matrix from an offset in radii to the stamp's own axes, 1/1024, times the offset in 1/256 radius.
+pub fn turned(row: [i32; 2], offset: [i32; 2]) -> i32 {
+    (row[0] * offset[0] + row[1] * offset[1]) >> 10
+}
+
+/// A row of the matrix from steps of the mesh's space to the stamp's own axes, 1/65,536 of 1/256 radius, times the way from
+/// the middle of the stamp. `reach`: twice the radius in steps; what is farther off is outside anyway.
+pub fn framed(row: [i32; 3], away: [i32; 3], reach: i32) -> i32 {
+    let [x, y, z] = away.map(|along| along.clamp(-reach, reach));
+    (row[0] * x + row[1] * y + row[2] * z) >> 16
+}
+
+/// Three signed bytes, the first in the lowest: a unit vector, 127 for 1.
+pub fn unpack_axis(packed: u32) -> [i32; 3] {
+    [packed << 24, packed << 16, packed << 8].map(|shifted| shifted as i32 >> 24)
+}
+
+/// Of two unit vectors: 16,129 if they are the same.
+pub fn dot_axes(a: [i32; 3], b: [i32; 3]) -> i32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// What stands upright on two unit vectors, 127 for 1.
+pub fn cross_axes(a: [i32; 3], b: [i32; 3]) -> [i32; 3] {
+    let part = |i: usize, j: usize| (a[i] * b[j] - a[j] * b[i]) / 127;
+    [part(1, 2), part(2, 0), part(0, 1)]
+}
+
+/// How much of a stamp reaches a texel `depth` (1/256 radius) in front of or behind its plane: 0..=256, all of it up to a
+/// quarter of the radius, nothing from a half on.
+pub fn depth_part(depth: i32) -> u32 {
+    ((128 - depth.abs()) * 4).clamp(0, 256) as u32
+}
+
+/// How much of a stamp a texel gets whose normal has this [`dot_axes`] with that of the stamp: 0..=256, all of it up to 73
+/// degrees, nothing from 84 on.
+pub fn facing_part(dot: i32) -> u32 {
+    ((dot - 1613) / 12).clamp(0, 256) as u32
+}
+
+/// A channel of a stamp, premultiplied, tinted, over another. `weight`: coverage of the stamp times its opacity, 0..=65,025.
+pub fn lay_stamp(channel: u32, tint: u32, opacity: u32, weight: u32, under: u32) -> u32 {
+    (channel * tint * opacity + under * (65_025 - weight) + 32_512) / 65_025
+}
+
+/// A slope of a stamp as a premultiplied colour, from its premultiplied slopes along its own axes and how these lie on the
+/// map, each of `unit` for 1; scaled by `bump` of 127.
+pub fn stamp_slope(slopes: [i32; 2], along: [i32; 2], unit: i32, bump: i32, coverage: u32) -> u32 {
+    let flat = (128 * coverage + 127) / 255;
+    let slope = (slopes[0] * along[0] + slopes[1] * along[1]) / unit * bump / 127;
+    (flat as i32 + slope).clamp(0, coverage as i32) as u32
+}
+
+/// How much a premultiplied colour of this coverage slopes: 0 if it is flat.
+pub fn slope_of(color: u32, coverage: u32) -> i32 {
+    color as i32 - ((128 * coverage + 127) / 255) as i32
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -192,6 +250,54 @@ mod tests {
         assert_eq!(falloff([-300, 200]), 0);
         assert!(falloff([181, 0]).abs_diff(1024) < 20);
         assert_eq!(falloff([120, 35]), falloff([-35, 120]));
+    }
+
+    #[test]
+    fn a_stamp_without_coverage_changes_nothing_and_a_full_one_everything() {
+        for under in 0..=255 {
+            assert_eq!(lay_stamp(0, 255, 255, 0, under), under);
+            assert_eq!(lay_stamp(77, 255, 255, 65_025, under), 77);
+            assert_eq!(lay_stamp(255, 77, 255, 65_025, under), 77);
+            // A premultiplied grey over the same grey.
+            let half = lay_stamp(under * 128 / 255, 255, 255, 128 * 255, under);
+            assert!(half.abs_diff(under) <= 1, "{under} {half}");
+        }
+    }
+
+    #[test]
+    fn frames_are_what_the_same_in_floats_is() {
+        // A stamp of radius 1,000 steps, turned by 30 degrees about the first axis.
+        let scale = 256.0 / 1000.0 * 65_536.0;
+        let row = |v: [f64; 3]| v.map(|part| (part * scale).round() as i32);
+        let (sin, cos) = (0.5, 0.75f64.sqrt());
+        for away in [[0, 0, 0], [300, -200, 640], [-1000, 0, 0], [90_000, -65_535, 4]] {
+            let float = away.map(|along: i32| f64::from(along.clamp(-2000, 2000)));
+            let rotated = [float[0], cos * float[1] + sin * float[2], cos * float[2] - sin * float[1]];
+            for (axis, expected) in
+                [[1.0, 0.0, 0.0], [0.0, cos, sin], [0.0, -sin, cos]].into_iter().zip(rotated)
+            {
+                let got = framed(row(axis), away, 2000);
+                assert!((f64::from(got) - expected * 0.256).abs() <= 1.1, "{away:?} {got} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn axes_and_parts() {
+        let pack = |v: [i8; 3]| u32::from_le_bytes([v[0] as u8, v[1] as u8, v[2] as u8, 9]);
+        assert_eq!(unpack_axis(pack([127, -127, -3])), [127, -127, -3]);
+        assert_eq!(dot_axes([127, 0, 0], [127, 5, 5]), 16_129);
+        assert_eq!(
+            (facing_part(16_129), facing_part(4700), facing_part(1000), facing_part(-16_129)),
+            (256, 256, 0, 0)
+        );
+        assert_eq!((depth_part(0), depth_part(-64), depth_part(96), depth_part(-128)), (256, 256, 128, 0));
+        assert_eq!((turned([1024, 0], [77, -5]), turned([0, -1024], [77, -5])), (77, 5));
+        // Flat stays flat, and a slope along the stamp's first axis is one along the map's, if they are the same.
+        assert_eq!((slope_of(100, 200), slope_of(110, 200)), (0, 10));
+        assert_eq!(stamp_slope([0, 0], [1024, 0], 1024, 127, 200), 100);
+        assert_eq!(stamp_slope([10, 3], [1024, 0], 1024, 127, 200), 110);
+        assert_eq!(stamp_slope([10, 3], [0, 1024], 1024, -127, 200), 97);
     }
 
     #[test]

@@ -27,8 +27,28 @@ pub struct Splat {
     pub bump: i32,
     /// Opacity of the bump, 0..=255.
     pub bump_opacity: u32,
-    /// To 48 bytes.
-    pub pad: [u32; 2],
+    /// Its shape: 0 is a round dome, others are stamps of the atlas, from 1.
+    pub stamp: u32,
+    /// 0: it lies on the map, by `center` and `radius`. 1: in the space of the mesh, by what follows; then it crosses from one
+    /// island of the map to another.
+    pub in_space: u32,
+    /// From the way from its middle to the first axis of the stamp. On the map two numbers, 1/1024, from an offset in radii; in
+    /// space three, see [`framed`](super::kernel::framed).
+    pub row_s: [i32; 3],
+    /// To the second axis.
+    pub row_t: [i32; 3],
+    /// In space: to the axis out of the surface.
+    pub row_n: [i32; 3],
+    /// In space: its middle, in steps of the [`SurfaceFrames`](super::SurfaceFrames).
+    pub origin: [i32; 3],
+    /// In space: twice its radius, in steps.
+    pub reach: i32,
+    /// In space: the axes, three signed bytes each, 127 for 1.
+    pub axis_s: u32,
+    /// The second.
+    pub axis_t: u32,
+    /// The third, out of the front of the surface.
+    pub axis_n: u32,
 }
 
 impl Splat {

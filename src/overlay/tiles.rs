@@ -2,6 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use super::frames::SurfaceFrames;
 use super::{Splat, Wrap};
 
 /// Texels along each side of a tile: one workgroup.
@@ -34,12 +35,13 @@ pub struct TileBins {
 
 impl TileBins {
     /// Appends the touched tiles of one surface to `headers`, and their splats to `list`, as numbers from
-    /// `first_splat` on. Tiles come in ascending order, splats within a tile in theirs.
+    /// `first_splat` on. `frames`: where the texels lie; without them, splats in space touch nothing. Tiles come in ascending order, splats within a tile in theirs.
     pub fn bin(
         &mut self,
         splats: &[Splat],
         size: u32,
         wrap: [Wrap; 2],
+        frames: Option<&SurfaceFrames>,
         first_splat: u32,
         headers: &mut Vec<TileHeader>,
         list: &mut Vec<u32>,
@@ -48,16 +50,23 @@ impl TileBins {
         if self.counts.len() < side * side {
             self.counts.resize(side * side, 0);
         }
-        for (number, splat) in splats.iter().enumerate() {
-            for row in tiles_on_axis(splat, 1, side, wrap[1]) {
-                for column in tiles_on_axis(splat, 0, side, wrap[0]) {
-                    let tile = row * side + column;
-                    if self.counts[tile] == 0 {
-                        self.touched.push(tile as u32);
-                    }
-                    self.counts[tile] += 1;
-                    self.pairs.push((tile as u32, first_splat + number as u32));
+        let Self { counts, touched, pairs } = self;
+        for (splat, number) in splats.iter().zip(first_splat..) {
+            let mut touch = |tile: u32| {
+                let count = &mut counts[tile as usize];
+                if *count == 0 {
+                    touched.push(tile);
                 }
+                *count += 1;
+                pairs.push((tile, number));
+            };
+            if splat.in_space == 0 {
+                for row in tiles_on_axis(splat, 1, side, wrap[1]) {
+                    tiles_on_axis(splat, 0, side, wrap[0])
+                        .for_each(|column| touch((row * side + column) as u32));
+                }
+            } else if let Some(frames) = frames {
+                frames.0.tiles_near(splat.origin, splat.reach / 2, touch);
             }
         }
         // A counting sort: `counts` turns into the place where a tile's next splat goes.
@@ -109,7 +118,7 @@ mod tests {
         for _ in 0..2 {
             headers.clear();
             list.clear();
-            bins.bin(splats, size, wrap, 0, &mut headers, &mut list);
+            bins.bin(splats, size, wrap, None, 0, &mut headers, &mut list);
         }
         assert!(bins.counts.iter().all(|&count| count == 0), "bins are clean between batches");
         headers.iter().map(|h| ((h.x, h.y), list[h.start as usize..][..h.count as usize].to_vec())).collect()

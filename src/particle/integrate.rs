@@ -5,6 +5,7 @@ use bevy::prelude::*;
 use super::{Forces, Particles, chunk_len, for_each_chunk};
 use crate::clock::WeatheringClock;
 use crate::effect::EffectTable;
+use crate::effect::drops::SIZE_CLASSES;
 use crate::weather::Weather;
 
 /// Numbers of an effect that motion needs: a scratch row of [`integrate_particles`].
@@ -44,25 +45,29 @@ pub fn integrate_particles(
     forces: Res<Forces>,
     weather: Res<Weather>,
     effects: Res<EffectTable>,
-    mut motions: Local<Vec<Motion>>,
+    mut motions: Local<Vec<[Motion; SIZE_CLASSES]>>,
     mut particles: ResMut<Particles>,
 ) {
     motions.clear();
     motions.extend(effects.rows().iter().map(|row| match &row.effect {
-        Some(effect) => Motion::new(&forces, effect.gravity_scale, effect.terminal_speed),
-        None => Motion::default(),
+        Some(effect) => {
+            std::array::from_fn(|class| Motion::new(&forces, effect.gravity_scale, row.terminal_speed(class)))
+        }
+        None => [Motion::default(); SIZE_CLASSES],
     }));
     let (motions, wind, tick) = (motions.as_slice(), weather.wind, clock.delta_secs());
-    let Particles { positions, velocities, lifespans, effects, .. } = particles.bypass_change_detection();
+    let Particles { positions, velocities, lifespans, effects, classes, .. } =
+        particles.bypass_change_detection();
     let len = chunk_len(positions.len(), PARALLEL_BATCH);
     let columns = positions.chunks_mut(len).zip(velocities.chunks_mut(len));
-    let columns = columns.zip(lifespans.chunks_mut(len)).zip(effects.chunks(len));
-    for_each_chunk(columns, |(((positions, velocities), lifespans), effects)| {
-        let rows = positions.iter_mut().zip(velocities).zip(lifespans).zip(effects);
-        for (((position, velocity), lifespan), effect) in rows {
+    let columns = columns.zip(lifespans.chunks_mut(len)).zip(effects.chunks(len)).zip(classes.chunks(len));
+    for_each_chunk(columns, |((((positions, velocities), lifespans), effects), classes)| {
+        let rows = positions.iter_mut().zip(velocities).zip(lifespans).zip(effects).zip(classes);
+        for ((((position, velocity), lifespan), effect), &class) in rows {
             lifespan.ticks_left = lifespan.ticks_left.saturating_sub(1);
             let dt = tick * lifespan.moving_part();
-            *velocity = motions[usize::from(effect.0)].step(*velocity, wind, dt);
+            *velocity =
+                motions[usize::from(effect.0)][usize::from(class) % SIZE_CLASSES].step(*velocity, wind, dt);
             *position += *velocity * dt;
         }
     });
@@ -89,7 +94,7 @@ mod tests {
     fn spawn(world: &mut World, velocity: Vec3, effect: EffectIndex, born_at: u16) {
         let lifespan = Lifespan { ticks_left: 9, born_at };
         let (position, sequence) = (Vec3::ZERO, Sequence(0));
-        let particle = Particle { position, velocity, lifespan, volume_nl: 1, sequence, effect };
+        let particle = Particle { position, velocity, lifespan, volume_nl: 1, sequence, effect, class: 0 };
         world.resource_mut::<Particles>().spawn([particle].into_iter());
     }
 
@@ -108,7 +113,7 @@ mod tests {
 
     #[test]
     fn falls_to_terminal_speed_and_no_faster() {
-        let effect = WeatherEffect { terminal_speed: 6.55, ..default() };
+        let effect = WeatherEffect { terminal_speed: Some(6.55), ..default() };
         let (mut world, index) = world_with(effect, Forces::default());
         spawn(&mut world, Vec3::ZERO, index, 0);
         run(&mut world, 600);
@@ -118,7 +123,7 @@ mod tests {
 
     #[test]
     fn without_drag_it_keeps_the_wind_out_and_falls_freely() {
-        let effect = WeatherEffect { terminal_speed: 0.0, ..default() };
+        let effect = WeatherEffect { terminal_speed: Some(0.0), ..default() };
         let (mut world, index) = world_with(effect, Forces::default());
         world.resource_mut::<Weather>().wind = Vec3::X * 50.0;
         spawn(&mut world, Vec3::ZERO, index, 0);
@@ -129,7 +134,7 @@ mod tests {
 
     #[test]
     fn a_storm_carries_light_particles_with_it() {
-        let effect = WeatherEffect { terminal_speed: 0.05, ..default() };
+        let effect = WeatherEffect { terminal_speed: Some(0.05), ..default() };
         let (mut world, index) = world_with(effect, Forces::default());
         world.resource_mut::<Weather>().wind = Vec3::X * 30.0;
         spawn(&mut world, Vec3::ZERO, index, 0);
@@ -140,7 +145,7 @@ mod tests {
 
     #[test]
     fn a_particle_born_within_the_tick_moves_only_the_rest_of_it() {
-        let effect = WeatherEffect { terminal_speed: 0.0, gravity_scale: 0.0, ..default() };
+        let effect = WeatherEffect { terminal_speed: Some(0.0), gravity_scale: 0.0, ..default() };
         let (mut world, index) = world_with(effect, Forces::default());
         spawn(&mut world, Vec3::X * 60.0, index, 0x4000);
         run(&mut world, 1);

@@ -13,6 +13,7 @@
 //! | volume | 4 |
 //! | [`Sequence`] | 4 |
 //! | [`EffectIndex`] | 2 |
+//! | size class | 1 |
 
 mod draw;
 mod integrate;
@@ -26,7 +27,10 @@ use crate::effect::EffectIndex;
 use crate::schedule::{RetireParticles, WeatheringSystems, WeatheringTick};
 use crate::weather::Weather;
 
-pub use draw::{ParticleDrawPlugin, ParticleMesh};
+pub use draw::{
+    GpuFrame, GpuLook, GpuParticle, ParticleDrawPlugin, ParticleMaterial, ParticleMesh, Splash, SplashConfig,
+    Splashes, add_splashes,
+};
 pub use integrate::integrate_particles;
 pub use pool::{Particle, Particles};
 pub(crate) use pool::{SavedParticle, chunk_len, for_each_chunk};

@@ -22,6 +22,8 @@ pub struct Particle {
     pub sequence: Sequence,
     /// What it is.
     pub effect: EffectIndex,
+    /// Size class of its drops, 0..16; see [`DropSizes`](crate::effect::DropSizes).
+    pub class: u8,
 }
 
 /// The particles in flight: a column for each property. Their order means nothing; what must have one is ordered by
@@ -34,6 +36,7 @@ pub struct Particles {
     pub(crate) volumes_nl: Vec<u32>,
     pub(crate) sequences: Vec<Sequence>,
     pub(crate) effects: Vec<EffectIndex>,
+    pub(crate) classes: Vec<u8>,
     /// Those from here on were born in this tick.
     newborn: usize,
 }
@@ -44,7 +47,8 @@ impl Particles {
         + size_of::<Lifespan>()
         + size_of::<u32>()
         + size_of::<Sequence>()
-        + size_of::<EffectIndex>();
+        + size_of::<EffectIndex>()
+        + size_of::<u8>();
 
     /// How many there are.
     pub fn len(&self) -> usize {
@@ -91,6 +95,11 @@ impl Particles {
         &self.sequences
     }
 
+    /// Size class of the drops of each.
+    pub fn classes(&self) -> &[u8] {
+        &self.classes
+    }
+
     /// What each is.
     pub fn effects(&self) -> &[EffectIndex] {
         &self.effects
@@ -109,6 +118,7 @@ impl Particles {
             volume_nl: self.volumes_nl[index],
             sequence: self.sequences[index],
             effect: self.effects[index],
+            class: self.classes[index],
         }
     }
 
@@ -131,6 +141,7 @@ impl Particles {
         self.volumes_nl.reserve(count);
         self.sequences.reserve(count);
         self.effects.reserve(count);
+        self.classes.reserve(count);
         for particle in born {
             self.positions.push(particle.position);
             self.velocities.push(particle.velocity);
@@ -138,6 +149,7 @@ impl Particles {
             self.volumes_nl.push(particle.volume_nl);
             self.sequences.push(particle.sequence);
             self.effects.push(particle.effect);
+            self.classes.push(particle.class);
         }
     }
 
@@ -154,6 +166,7 @@ impl Particles {
                     volume_nl: self.volumes_nl.swap_remove(index),
                     sequence: self.sequences.swap_remove(index),
                     effect: self.effects.swap_remove(index),
+                    class: self.classes.swap_remove(index),
                 };
                 tell(dead);
             }
@@ -177,6 +190,7 @@ pub(crate) struct SavedParticle {
     volume_nl: u32,
     pub(crate) sequence: u32,
     pub(crate) effect: u16,
+    class: u8,
 }
 
 impl From<Particle> for SavedParticle {
@@ -190,6 +204,7 @@ impl From<Particle> for SavedParticle {
             volume_nl: particle.volume_nl,
             sequence: particle.sequence.0,
             effect: particle.effect.0,
+            class: particle.class,
         }
     }
 }
@@ -204,6 +219,7 @@ impl From<SavedParticle> for Particle {
             volume_nl: saved.volume_nl,
             sequence: Sequence(saved.sequence),
             effect: EffectIndex(saved.effect),
+            class: saved.class,
         }
     }
 }
@@ -244,6 +260,7 @@ mod tests {
             volume_nl: 10 * number,
             sequence: Sequence(number),
             effect: EffectIndex(number as u16 % 3),
+            class: number as u8 % 16,
         }
     }
 

@@ -41,6 +41,7 @@ mod tests {
             volume_nl: 10 + number,
             sequence: Sequence(number),
             effect: EffectIndex(1),
+            class: 0,
         };
         let mut struck = particle(9, 2);
         struck.lifespan.mark_hit();

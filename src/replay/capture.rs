@@ -1,6 +1,5 @@
 //! Pictures of the running scene.
 
-use std::io::Cursor;
 use std::path::Path;
 use std::time::Instant;
 
@@ -9,8 +8,10 @@ use bevy::camera::RenderTarget;
 use bevy::prelude::*;
 use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat, TextureUsages};
 use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
+use image::{ImageError, ImageFormat};
 
-use super::{ReplayError, Run, give_up_after, write_atomic};
+use super::{ReplayError, Run, give_up_after};
+use crate::picture::{PictureError, write_picture};
 
 /// Pictures that have come back from the GPU.
 #[derive(Resource, Default)]
@@ -78,14 +79,12 @@ impl Run<'_> {
 /// Writes a picture, without its alpha channel.
 ///
 /// # Errors
-/// [`ReplayError::Encode`] and [`ReplayError::Write`] with the path.
+/// [`ReplayError::Picture`] with the path.
 pub fn write_png(path: &Path, image: Image) -> Result<(), ReplayError> {
-    let encode = |source| ReplayError::Encode { path: path.into(), source };
-    let image = image
-        .try_into_dynamic()
-        .map_err(|error| encode(image::ImageError::IoError(std::io::Error::other(error.to_string()))))?;
-    let mut bytes = Cursor::new(Vec::new());
+    let picture = image.try_into_dynamic().map_err(|error| {
+        let source = ImageError::IoError(std::io::Error::other(error.to_string()));
+        PictureError::Image { path: path.into(), source }
+    })?;
     // The alpha channel of a finished picture means nothing.
-    image.to_rgb8().write_to(&mut bytes, image::ImageFormat::Png).map_err(encode)?;
-    write_atomic(path, bytes.get_ref())
+    Ok(write_picture(path, &picture.to_rgb8().into(), ImageFormat::Png)?)
 }

@@ -24,14 +24,16 @@ pub(super) fn require_writable(folder: &Path) -> Result<(), ReplayError> {
     writable.map(drop).map_err(|source| ReplayError::Write { path: folder.into(), source })
 }
 
-/// Removes what an earlier run left in the folder, so that nothing of it stands beside this one's files.
+/// Removes what an earlier run left in the folder, so that nothing of it stands beside this one's files: pictures from
+/// number `first` on, maps and report. The pictures before are those of the run that this one goes on with.
 ///
 /// # Errors
 /// [`ReplayError::Write`] with the file.
-pub(super) fn remove_earlier_run(folder: &Path) -> Result<(), ReplayError> {
+pub(super) fn remove_earlier_run(folder: &Path, first: u32) -> Result<(), ReplayError> {
     let is_frame = |name: &str| {
         let number = name.strip_prefix("frame_").and_then(|name| name.strip_suffix(".png"));
-        number.is_some_and(|number| number.len() >= 5 && number.bytes().all(|byte| byte.is_ascii_digit()))
+        let is_number = |text: &&str| text.len() >= 5 && text.bytes().all(|byte| byte.is_ascii_digit());
+        number.filter(is_number).is_some_and(|text| text.parse::<u32>().is_ok_and(|number| number >= first))
     };
     let is_map = |name: &str| MAP_NAMES.iter().any(|map| name.ends_with(&format!("_{map}.png")));
     let ours: [(&Path, &dyn Fn(&str) -> bool); 2] =
@@ -71,10 +73,23 @@ mod tests {
         for name in ours.iter().chain(&others) {
             write_atomic(&folder.path().join(name), b"x").unwrap();
         }
-        remove_earlier_run(folder.path()).unwrap();
+        remove_earlier_run(folder.path(), 0).unwrap();
         assert!(ours.iter().all(|name| !folder.path().join(name).exists()));
         assert!(others.iter().all(|name| folder.path().join(name).exists()));
-        remove_earlier_run(&folder.path().join("nowhere")).unwrap();
+        remove_earlier_run(&folder.path().join("nowhere"), 0).unwrap();
+    }
+
+    #[test]
+    fn pictures_of_the_run_that_is_gone_on_with_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let (before, after) =
+            (["frame_00000.png", "frame_00011.png"], ["frame_00012.png", "frame_100000.png"]);
+        for name in before.iter().chain(&after) {
+            write_atomic(&folder.path().join(name), b"x").unwrap();
+        }
+        remove_earlier_run(folder.path(), 12).unwrap();
+        assert!(before.iter().all(|name| folder.path().join(name).exists()));
+        assert!(after.iter().all(|name| !folder.path().join(name).exists()));
     }
 
     #[test]

@@ -1,17 +1,17 @@
 //! The maps at the end of a run, wherever they were painted.
 
-use std::io::Cursor;
 use std::path::Path;
 use std::time::Instant;
 
 use bevy::prelude::*;
 use bevy::render::gpu_readback::{Readback, ReadbackComplete};
-use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use image::{ImageFormat, Luma, Rgba};
 
-use super::{ReplayError, Run, give_up_after, write_atomic};
+use super::{ReplayError, Run, give_up_after};
 use crate::clock::WeatheringClock;
 use crate::material::PorousMaterial;
 use crate::overlay::{CpuMaps, Overlays, SplatStats, SurfaceTotals, Weatherable};
+use crate::picture::{square, write_picture};
 use crate::scenario::ScenarioSurface;
 use crate::weather::DryingClock;
 use crate::wetting::query::{summary, wetness_of};
@@ -169,7 +169,8 @@ pub(super) fn write_maps(folder: &Path, surfaces: &[SurfaceMaps]) -> Result<(), 
         for (path, texels) in
             [(diffuse, &surface.diffuse), (specular, &surface.specular), (normal, &surface.normal)]
         {
-            write_map(&path, texels, surface.size, ExtendedColorType::Rgba8)?;
+            let picture = square::<Rgba<u8>>(&path, surface.size, texels.clone())?;
+            write_picture(&path, &picture, ImageFormat::Png)?;
         }
         let texels = || surface.wetness.iter();
         write_grey(&film, surface.size, texels().map(|texel| texel.film_mm * 1000.0))?;
@@ -182,16 +183,9 @@ pub(super) fn write_maps(folder: &Path, surfaces: &[SurfaceMaps]) -> Result<(), 
 }
 
 fn write_grey(path: &Path, size: u32, values: impl Iterator<Item = f32>) -> Result<(), ReplayError> {
-    let texels: Vec<u16> = values.map(|value| value.round().clamp(0.0, 65_535.0) as u16).collect();
-    write_map(path, bytemuck::cast_slice(&texels), size, ExtendedColorType::L16)
-}
-
-fn write_map(path: &Path, bytes: &[u8], size: u32, color: ExtendedColorType) -> Result<(), ReplayError> {
-    let mut file = Cursor::new(Vec::new());
-    PngEncoder::new(&mut file)
-        .write_image(bytes, size, size, color)
-        .map_err(|source| ReplayError::Encode { path: path.into(), source })?;
-    write_atomic(path, file.get_ref())
+    let texels = values.map(|value| value.round().clamp(0.0, 65_535.0) as u16).collect();
+    let picture = square::<Luma<u16>>(path, size, texels)?;
+    Ok(write_picture(path, &picture, ImageFormat::Png)?)
 }
 
 #[cfg(test)]

@@ -19,8 +19,8 @@ use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 
 use crate::clock::WeatheringClock;
-use crate::emitter::EmissionSeed;
 use crate::overlay::SurfaceTotals;
+use crate::picture::PictureError;
 use crate::save::{ColorMaps, SaveError, SavedScene};
 use crate::scenario::{LoadedScenario, ScenarioError, ScenarioPlugin, ScenarioStatus};
 
@@ -41,17 +41,18 @@ pub struct ReplayOptions {
     pub fps: u32,
     /// Size of the pictures in pixels, up to [`Self::MAX_SIZE`] each way.
     pub size: UVec2,
-    /// In place of the scenario's length.
+    /// In place of the scenario's length. Counted from its start, also with `resume`.
     pub seconds: Option<f32>,
-    /// In place of the scenario's seed.
+    /// In place of the scenario's seed. Not with `resume`: a saved scene goes on with its own.
     pub seed: Option<u64>,
-    /// Threads to compute with; all cores if `None`. The first replay of a process decides for all that follow.
+    /// Threads to compute ticks with; all cores if `None`. The first replay of a process decides for all that follow.
+    /// Exposure to air and sun is found out by a thread of the operating system for each core, whatever this says.
     pub threads: Option<usize>,
     /// Draw pictures.
     pub render: bool,
     /// A [saved scene](crate::save) to go on from.
     pub resume: Option<PathBuf>,
-    /// Folder to save the scene into at the end.
+    /// Folder to save the scene into at the end. Of its own: neither `out` nor one that holds it.
     pub save: Option<PathBuf>,
 }
 
@@ -107,14 +108,9 @@ pub enum ReplayError {
         /// Why.
         source: std::io::Error,
     },
-    /// A picture could not be encoded.
-    #[error("cannot encode {}: {source}", .path.display())]
-    Encode {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: image::ImageError,
-    },
+    /// A picture or a map could not be written.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
     /// The renderer did not answer.
     #[error("gave up after {seconds} s waiting for {what}")]
     TimedOut {
@@ -151,33 +147,34 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
     let begun = Instant::now();
     options.check()?;
     let saved = options.resume.as_deref().map(SavedScene::read).transpose()?;
-    let file = std::fs::read(&options.scenario.file)
-        .map_err(|source| ScenarioError::Read { file: options.scenario.file.clone(), source })?;
-    let mut run = Run::load(options, saved.as_ref().map(SavedScene::seed))?;
+    let mut run = Run::load(options)?;
     if let (Some(saved), Some(folder)) = (&saved, &options.resume) {
-        run.resume(saved, &file, folder)?;
+        run.resume(saved, folder)?;
     }
-    if let Some(out) = &options.out {
-        files::require_writable(out)?;
-        files::remove_earlier_run(out)?;
-    }
-    let loaded = begun.elapsed();
-
     let clock = *run.app.world().resource::<WeatheringClock>();
     let seconds = options.seconds.unwrap_or(options.scenario.scenario.seconds);
     let ticks = (f64::from(seconds) * f64::from(clock.hz())).round() as u32;
-    let frames = if options.render {
-        (u64::from(ticks) * u64::from(options.fps)).div_ceil(u64::from(clock.hz())) as u32
-    } else {
-        0
-    };
-    let mut tick = clock.tick().min(ticks);
-    for frame in 0..frames {
+    let mut tick = clock.tick();
+    if ticks < tick {
+        let expected = format!("at least {}, the time of the saved scene", clock.seconds());
+        return Err(ReplayError::Option { option: "seconds", value: seconds.to_string(), expected });
+    }
+    // The first picture that is due at a tick or later.
+    let frame_at =
+        |tick: u32| (u64::from(tick) * u64::from(options.fps)).div_ceil(u64::from(clock.hz())) as u32;
+    // Those before were drawn before it was saved.
+    let frames = frame_at(tick)..(if options.render { frame_at(ticks) } else { 0 });
+    if let Some(folder) = &options.save {
+        SavedScene::check_folder(folder)?;
+    }
+    if let Some(out) = &options.out {
+        files::require_writable(out)?;
+        files::remove_earlier_run(out, frames.start)?;
+    }
+    let loaded = begun.elapsed();
+
+    for frame in frames.clone() {
         let due = (u64::from(frame) * u64::from(clock.hz()) / u64::from(options.fps)) as u32;
-        if due < tick {
-            // Drawn before it was saved.
-            continue;
-        }
         run.capture(frame)?;
         run.step(due - tick)?;
         tick = due;
@@ -198,21 +195,20 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
         load_seconds: loaded.as_secs_f64(),
         run_seconds: simulated.as_secs_f64(),
         total_seconds: begun.elapsed().as_secs_f64(),
-        frames,
+        frames: frames.len() as u32,
     };
-    if let Some(folder) = &options.save {
-        let seed = run.app.world().resource::<EmissionSeed>().0;
-        let colors = maps.iter().map(|maps| ColorMaps {
-            diffuse: maps.diffuse.clone(),
-            specular: maps.specular.clone(),
-            normal: maps.normal.clone(),
-        });
-        SavedScene::capture(run.app.world_mut(), &file, seed, colors.collect()).write(folder)?;
-    }
     let report = report::report(run.app.world_mut(), options, &maps, timing);
     if let Some(out) = &options.out {
         maps::write_maps(&out.join("maps"), &maps)?;
         write_atomic(&out.join("report.json"), &serde_json::to_vec_pretty(&report)?)?;
+    }
+    if let Some(folder) = &options.save {
+        let colors = maps.into_iter().map(|maps| ColorMaps {
+            diffuse: maps.diffuse,
+            specular: maps.specular,
+            normal: maps.normal,
+        });
+        SavedScene::capture(run.app.world_mut(), &options.scenario, colors.collect()).write(folder)?;
     }
     Ok(report)
 }
@@ -237,6 +233,20 @@ impl ReplayOptions {
         if self.threads == Some(0) {
             return wrong("threads", "0".into(), "at least 1".into());
         }
+        if let (Some(seed), Some(_)) = (self.seed, &self.resume) {
+            return wrong(
+                "seed",
+                seed.to_string(),
+                "left out with `resume`: a saved scene has its own".into(),
+            );
+        }
+        let place = |folder: &Path| std::path::absolute(folder).unwrap_or_else(|_| folder.into());
+        if let (Some(save), Some(out)) = (&self.save, &self.out)
+            && place(out).join("maps").starts_with(place(save))
+        {
+            let value = save.display().to_string();
+            return wrong("save", value, "a folder of its own, beside those of `out` or in them".into());
+        }
         Ok(())
     }
 }
@@ -252,12 +262,12 @@ struct Run<'a> {
 
 impl<'a> Run<'a> {
     /// Builds the app and waits until the scene is there.
-    fn load(options: &'a ReplayOptions, saved_seed: Option<u64>) -> Result<Self, ReplayError> {
+    fn load(options: &'a ReplayOptions) -> Result<Self, ReplayError> {
         if options.render {
             require_adapter()?;
         }
         let mut scenario = ScenarioPlugin::new(options.scenario.clone(), options.render)?;
-        scenario.seed = saved_seed.or(options.seed);
+        scenario.seed = options.seed;
         let mut app = app::build(options, scenario);
         let target = options.render.then(|| capture::add_target(app.world_mut(), options.size));
         let mut run = Self { options, app, target, painted_before: 0 };
@@ -285,8 +295,8 @@ impl<'a> Run<'a> {
     }
 
     /// Puts a saved scene in place of the fresh one.
-    fn resume(&mut self, saved: &SavedScene, file: &[u8], folder: &Path) -> Result<(), ReplayError> {
-        saved.restore(self.app.world_mut(), file, folder)?;
+    fn resume(&mut self, saved: &SavedScene, folder: &Path) -> Result<(), ReplayError> {
+        saved.restore(self.app.world_mut(), &self.options.scenario, folder)?;
         let world = self.app.world_mut();
         self.painted_before = world.query::<&SurfaceTotals>().iter(world).map(|totals| totals.impacts).sum();
         for _ in 0..3 {

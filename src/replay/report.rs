@@ -27,13 +27,13 @@ pub struct Report {
     pub particles: ParticleReport,
     /// All water.
     pub water: WaterReport,
-    /// What moving it took.
+    /// What moving it took; of a run that was resumed, from there on.
     pub work: WorkReport,
     /// In the order of the scenario.
     pub surfaces: Vec<SurfaceReport>,
     /// Hash over all impacts and all amounts; see [`amounts_digest`].
     pub digest: String,
-    /// Wall-clock time; the one part that differs from run to run.
+    /// Wall-clock time and pictures of this run. Nothing else differs from run to run but `work`, after a resume.
     pub timing: Timing,
 }
 
@@ -114,7 +114,7 @@ pub struct Timing {
     pub run_seconds: f64,
     /// All of it.
     pub total_seconds: f64,
-    /// Pictures drawn.
+    /// Pictures drawn, without those of the run that this one goes on with.
     pub frames: u32,
 }
 

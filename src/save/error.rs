@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::picture::PictureError;
+
 /// Why a scene could not be saved or restored. Every variant names the file.
 #[derive(thiserror::Error, Debug)]
 #[non_exhaustive]
@@ -38,14 +40,9 @@ pub enum SaveError {
         /// Why.
         source: Box<ron::Error>,
     },
-    /// A picture cannot be encoded or decoded.
-    #[error("{}: {source}", .path.display())]
-    Image {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: image::ImageError,
-    },
+    /// A map cannot be written or read.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
     /// A value does not fit.
     #[error("{}: `{field}` is {value}, but must be {expected}", .path.display())]
     Value {

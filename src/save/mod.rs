@@ -1,8 +1,9 @@
 //! Keeping a scene: all its maps, and all else that its future depends on, in one folder.
 //!
-//! [`SavedScene::capture`] takes what a running scenario holds, [`SavedScene::write`] puts it into a folder that is there
-//! whole or not at all, and a run that [restores](SavedScene::restore) it goes on to the same digest as one that was never
-//! interrupted.
+//! [`SavedScene::capture`] takes what a running scenario holds, [`SavedScene::write`] puts it into a folder of its own, and
+//! a run that [restores](SavedScene::restore) it goes on to the same digest as one that was never interrupted. It fits the
+//! scenario it was saved from: the same `.ron` file, to the byte. Effects, meshes and textures that the file names are not
+//! compared.
 //!
 //! | file | holds |
 //! |---|---|
@@ -25,10 +26,10 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::clock::WeatheringClock;
-use crate::emitter::{Emitter, EmitterState, NewParticles};
+use crate::emitter::{EmissionSeed, Emitter, EmitterState, NewParticles};
 use crate::overlay::{SurfaceTotals, SurfaceTraces};
 use crate::particle::{ParticleCounts, Particles, SavedParticle, WaterCounts};
-use crate::scenario::{Digest, ScenarioSurface};
+use crate::scenario::{Digest, LoadedScenario, ScenarioSurface};
 use crate::weather::{DryingClock, DryingPoint, Weather};
 use crate::wetting::{Ledger, SurfaceWater};
 
@@ -51,7 +52,7 @@ pub struct SavedScene {
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneState {
     pub(super) version: u32,
-    /// Hash of the scenario's file.
+    /// Hash of the scenario's `.ron` file.
     pub(super) scenario: String,
     pub(super) seed: u64,
     pub(super) tick: u32,
@@ -116,9 +117,8 @@ pub(super) fn surfaces_in_order(world: &mut World) -> Vec<(Entity, String)> {
 }
 
 impl SavedScene {
-    /// Takes the state of a scenario. `scenario`: its file, as it was read; `colors`: the colour maps of its surfaces, in
-    /// its order.
-    pub fn capture(world: &mut World, scenario: &[u8], seed: u64, colors: Vec<ColorMaps>) -> Self {
+    /// Takes the state of a scenario. `colors`: the colour maps of its surfaces, in its order.
+    pub fn capture(world: &mut World, scenario: &LoadedScenario, colors: Vec<ColorMaps>) -> Self {
         let mut particles: Vec<SavedParticle> =
             world.resource::<Particles>().iter().map(SavedParticle::from).collect();
         particles.sort_unstable_by_key(|particle| particle.sequence);
@@ -148,8 +148,8 @@ impl SavedScene {
         let new = world.resource::<NewParticles>();
         let state = SceneState {
             version: VERSION,
-            scenario: blake3::hash(scenario).to_hex().to_string(),
-            seed,
+            scenario: scenario.hash.clone(),
+            seed: world.resource::<EmissionSeed>().0,
             tick: clock.tick(),
             hz: clock.hz(),
             digest: world.resource::<Digest>().0,
@@ -166,10 +166,22 @@ impl SavedScene {
         Self { state, surfaces }
     }
 
-    /// Writes the folder, in place of one that was saved there before. On an error that one is still there.
+    /// That a scene can be saved into this folder: better before a long run than after it. Makes the folder that it lies
+    /// in.
     ///
     /// # Errors
-    /// [`SaveError`] with the file.
+    /// [`SaveError::Write`] if it holds anything but a saved scene, is the folder that the program runs in or a mount point,
+    /// or cannot be written.
+    pub fn check_folder(folder: &Path) -> Result<(), SaveError> {
+        maps::check(folder).map(drop)
+    }
+
+    /// Writes the folder, in place of one that was saved there before. Everything is written beside it first, then that
+    /// one is moved aside, and back again if the new one cannot take its place. There is never half a scene in the folder;
+    /// between two renames there is none.
+    ///
+    /// # Errors
+    /// [`SaveError`] with the file; as [`Self::check_folder`], too.
     pub fn write(&self, folder: &Path) -> Result<(), SaveError> {
         maps::write(self, folder)
     }
@@ -185,10 +197,5 @@ impl SavedScene {
     /// Ticks that had run.
     pub fn tick(&self) -> u32 {
         self.state.tick
-    }
-
-    /// The seed of the run.
-    pub fn seed(&self) -> u64 {
-        self.state.seed
     }
 }

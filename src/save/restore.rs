@@ -9,29 +9,28 @@ use super::maps::value;
 use super::{SaveError, SavedScene, emitters_in_order, surfaces_in_order};
 use crate::clock::WeatheringClock;
 use crate::effect::EffectTable;
-use crate::emitter::{EmitterState, NewParticles};
+use crate::emitter::{EmissionSeed, EmitterState, NewParticles};
 use crate::overlay::{CpuMaps, Overlays, SurfaceTotals, SurfaceTraces, Weatherable};
 use crate::particle::Particles;
-use crate::scenario::Digest;
+use crate::scenario::{Digest, LoadedScenario, check_weather};
 use crate::weather::DryingClock;
 use crate::wetting::SurfaceWater;
 
 impl SavedScene {
-    /// Puts the state into a world whose scenario, `scenario` as it was read, is ready and has run no tick. `folder` is for
-    /// messages.
+    /// Puts the state into a world whose scenario is ready and has run no tick. `folder` is for messages.
     ///
     /// # Errors
-    /// [`SaveError::Value`] if it was saved from another scenario; then the world is as it was.
-    pub fn restore(&self, world: &mut World, scenario: &[u8], folder: &Path) -> Result<(), SaveError> {
+    /// [`SaveError::Value`] if it was saved from another `.ron` file, or makes no sense; then the world is as it was.
+    pub fn restore(
+        &self,
+        world: &mut World,
+        scenario: &LoadedScenario,
+        folder: &Path,
+    ) -> Result<(), SaveError> {
         let (state, path) = (&self.state, folder.join("state.ron"));
-        let hash = blake3::hash(scenario).to_hex().to_string();
-        if state.scenario != hash {
-            return Err(value(
-                &path,
-                "scenario",
-                &state.scenario,
-                format!("{hash}, the hash of this scenario"),
-            ));
+        if state.scenario != scenario.hash {
+            let expected = format!("{}, the hash of this scenario's .ron file", scenario.hash);
+            return Err(value(&path, "scenario", &state.scenario, expected));
         }
         let emitters = emitters_in_order(world);
         if emitters.len() != state.emitters.len() {
@@ -58,6 +57,14 @@ impl SavedScene {
         if clock.hz() != state.hz {
             return Err(value(&path, "hz", state.hz, clock.hz().to_string()));
         }
+        if state.counts.alive != state.particles.len() as u64 {
+            let expected = format!("{}, as many as `particles`", state.particles.len());
+            return Err(value(&path, "counts.alive", state.counts.alive, expected));
+        }
+        if let Err(wrong) = check_weather(&state.weather) {
+            let expected = format!("{} to {}", wrong.least, wrong.most);
+            return Err(value(&path, &format!("weather.{}", wrong.field), wrong.value, expected));
+        }
         let drying = DryingClock::from_points(state.drying.clone());
         let Some(drying) =
             drying.filter(|drying| drying.points().iter().all(|point| point.tick <= state.tick))
@@ -78,6 +85,7 @@ impl SavedScene {
         world.insert_resource(state.counts);
         world.insert_resource(state.water.clone());
         world.insert_resource(Digest(state.digest));
+        world.insert_resource(EmissionSeed(state.seed));
         world.resource_mut::<WeatheringClock>().go_to(state.tick);
         for (entity, emitter) in emitters.into_iter().zip(&state.emitters) {
             if let Some(mut state) = world.get_mut::<EmitterState>(entity) {

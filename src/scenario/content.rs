@@ -1,7 +1,9 @@
 //! The files and generated data a scenario is made of. Everything is loaded before the first tick.
 
+use std::collections::BTreeMap;
+use std::path::Path;
+
 use bevy::asset::RenderAssetUsages;
-use bevy::image::{CompressedImageFormats, ImageSampler, ImageType};
 use bevy::math::{Affine2, Affine3A};
 use bevy::prelude::*;
 use bevy::render::render_resource::Face;
@@ -57,8 +59,17 @@ impl LoadedScenario {
             let field = format!("emitters[{index}].effect");
             let path = self.resolve(&field, &emitter.effect)?;
             let bytes = std::fs::read(path).map_err(|e| self.content_error(&field, &emitter.effect, e))?;
-            let effect = WeatherEffect::from_ron(&bytes);
-            effects.push(effect.map_err(|e| self.content_error(&field, &emitter.effect, e))?);
+            let wrong = |e| self.content_error(&field, &emitter.effect, e);
+            let mut effect = WeatherEffect::from_ron(&bytes).map_err(wrong)?;
+            let mut files = BTreeMap::new();
+            for file in effect.stamps.files() {
+                let beside = Path::new(&emitter.effect).with_file_name(file);
+                let path = self.resolve(&field, &beside.to_string_lossy())?;
+                let bytes = std::fs::read(path).map_err(|e| self.content_error(&field, file, e))?;
+                files.insert(file.to_owned(), bytes);
+            }
+            effect.stamp_set = effect.stamps.read(&files).map_err(wrong)?;
+            effects.push(effect);
         }
         let mut meshes = Vec::new();
         for (index, surface) in scenario.surfaces.iter().enumerate() {
@@ -164,19 +175,14 @@ impl LoadedScenario {
     fn photo(&self, field: &str, file: &str, is_srgb: bool) -> Result<Image, ScenarioError> {
         let path = self.resolve(field, file)?;
         let bytes = std::fs::read(&path).map_err(|e| self.content_error(field, file, e))?;
-        let image = Image::from_buffer(
-            &bytes,
-            ImageType::Extension("png"),
-            CompressedImageFormats::NONE,
-            is_srgb,
-            ImageSampler::Default,
-            RenderAssetUsages::default(),
-        );
-        let image = image.map_err(|e| self.content_error(field, file, e))?;
+        let picture = image::load_from_memory_with_format(&bytes, image::ImageFormat::Png);
+        let picture = picture.map_err(|e| self.content_error(field, file, e))?;
+        // Whatever it was: 16-bit and grey ones, as wet maps are, too.
+        let image =
+            Image::from_dynamic(picture.into_rgba8().into(), is_srgb, RenderAssetUsages::RENDER_WORLD);
         let mut image =
             with_mips(image, MipContent::Values).map_err(|e| self.content_error(field, file, e))?;
         image.sampler = tiling_sampler();
-        image.asset_usage = RenderAssetUsages::RENDER_WORLD;
         Ok(image)
     }
 }
@@ -229,5 +235,39 @@ impl MaterialMaps {
             ..default()
         };
         (material, textures)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::render::render_resource::TextureFormat;
+
+    use super::*;
+    use crate::scenario::Scenario;
+    use crate::wetmap::{GreyMap, write_map};
+
+    #[test]
+    fn wet_maps_are_read_as_they_are_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let map = GreyMap::new(2, 2, vec![0.0, 0.25, 0.5, 1.0]).unwrap();
+        write_map(&folder.path().join("map.png"), &map).unwrap();
+        let scenario = r#"(
+            seconds: 1.0,
+            camera: (keys: [(eye: (0.0, 1.0, 2.0), target: (0.0, 0.0, 0.0))]),
+            materials: {"plain": ()},
+            surfaces: [(
+                name: "ground",
+                mesh: Ground(size: (1.0, 1.0), cells: (2, 2)),
+                material: "plain",
+                wet_map: (map: "map.png", seconds: 1.0),
+            )],
+        )"#;
+        let file = folder.path().join("scene.ron");
+        std::fs::write(&file, scenario).unwrap();
+        let content = Scenario::load(&file).unwrap().content(true).unwrap();
+        let image = content.wet_maps[0].as_ref().expect("there is a map");
+        assert_eq!(image.texture_descriptor.format, TextureFormat::Rgba8Unorm);
+        let texels = &image.data.as_ref().expect("it has texels")[..16];
+        assert_eq!([0, 4, 8, 12].map(|at| texels[at]), [0, 64, 128, 255]);
     }
 }

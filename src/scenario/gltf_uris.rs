@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::{LoadedScenario, ScenarioError};
-use crate::scenes::gltf_mesh::percent_decoded;
+use crate::scenes::gltf_mesh::{data_uri, percent_decoded};
 
 impl LoadedScenario {
     /// Checks that a glTF and every buffer and image it refers to exist inside the tree.
@@ -20,10 +20,11 @@ impl LoadedScenario {
         let folder = Path::new(value).parent().unwrap_or(Path::new(""));
         for list in ["buffers", "images"] {
             for uri in json[list].as_array().into_iter().flatten().filter_map(|entry| entry["uri"].as_str()) {
-                if !uri.starts_with("data:") {
-                    let decoded = percent_decoded(uri);
-                    let inside = folder.join(decoded.as_ref().map_or(uri, |decoded| decoded));
-                    self.resolve(&format!("{field} -> {list}"), &inside.to_string_lossy())?;
+                let field = format!("{field} -> {list}");
+                let no_text = || self.content_error(&field, uri, "its escapes stand for no text");
+                let decoded = percent_decoded(uri).ok_or_else(no_text)?;
+                if data_uri(&decoded).is_none() {
+                    self.resolve(&field, &folder.join(&*decoded).to_string_lossy())?;
                 }
             }
         }
@@ -41,12 +42,42 @@ fn json_chunk(bytes: &[u8]) -> Option<&[u8]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scenario::Scenario;
+
+    /// A scenario whose mesh has its buffer here.
+    fn load(uri: &str) -> Result<LoadedScenario, ScenarioError> {
+        let folder = tempfile::tempdir().unwrap();
+        let gltf = serde_json::json!({
+            "asset": { "version": "2.0" },
+            "buffers": [{ "uri": uri, "byteLength": 3 }],
+        });
+        std::fs::write(folder.path().join("mesh.gltf"), gltf.to_string()).unwrap();
+        let scenario = r#"(
+            seconds: 1.0,
+            camera: (keys: [(eye: (0.0, 1.0, 2.0), target: (0.0, 0.0, 0.0))]),
+            materials: {"clay": ()},
+            surfaces: [(name: "mesh", mesh: File("mesh.gltf"), material: "clay")],
+        )"#;
+        let file = folder.path().join("scene.ron");
+        std::fs::write(&file, scenario).unwrap();
+        Scenario::load(&file)
+    }
 
     #[test]
-    fn escapes_are_seen_through() {
-        assert_eq!(percent_decoded("a%20b%2e%2E%2Fc").as_deref(), Some("a b../c"));
-        assert_eq!(percent_decoded("100%").as_deref(), Some("100%"));
-        assert_eq!(percent_decoded("%ff"), None);
+    fn uris_are_what_bevy_takes_them_for() {
+        load("data:application/octet-stream;base64,AAAA").unwrap();
+        load("data%3Aapplication/octet-stream;base64,AAAA").unwrap();
+        let error = |uri| load(uri).unwrap_err().to_string();
+        for (uri, named) in [
+            ("a%ff.bin", "escapes"),
+            ("a%20b.bin", "a b.bin"),
+            ("%2e%2e/a.bin", "outside"),
+            // Without a comma it is a path.
+            ("data:/../../a.bin", "outside"),
+        ] {
+            let error = error(uri);
+            assert!(error.contains("surfaces[0].mesh -> buffers") && error.contains(named), "{uri}: {error}");
+        }
     }
 
     #[test]

@@ -15,6 +15,8 @@ pub struct LoadedScenario {
     pub file: PathBuf,
     /// The folder that its paths are relative to and may not leave; absolute.
     pub tree: PathBuf,
+    /// Hash of the file as it was read, 64 hexadecimal digits. What the file names is not in it.
+    pub hash: String,
 }
 
 impl Scenario {
@@ -44,7 +46,8 @@ impl Scenario {
             Some(above) if folder.ends_with("scenarios") => above,
             _ => folder,
         };
-        let loaded = LoadedScenario { scenario, file: file.into(), tree: tree.into() };
+        let hash = blake3::hash(&bytes).to_hex().to_string();
+        let loaded = LoadedScenario { scenario, file: file.into(), tree: tree.into(), hash };
         loaded.validate()?;
         Ok(loaded)
     }

@@ -30,3 +30,4 @@ pub use schema::{
     SunSpec, SurfaceSpec, SurfaceTextureSpec, TextureSpec, WeatherSpec, WetMapSpec,
 };
 pub use spawn::{ScenarioPlugin, ScenarioStatus, ScenarioSurface};
+pub(crate) use validate::check_weather;

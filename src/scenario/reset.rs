@@ -5,8 +5,8 @@ use bevy::prelude::*;
 use super::Digest;
 use crate::clock::WeatheringClock;
 use crate::emitter::{Emitter, EmitterState, NewParticles};
-use crate::overlay::{CpuMaps, SplatQueue, SurfaceTotals, Weatherable};
-use crate::particle::{ParticleCounts, Particles, WaterCounts};
+use crate::overlay::{CpuMaps, SplatQueue, SurfaceTotals, SurfaceTraces, Weatherable};
+use crate::particle::{ParticleCounts, Particles, Splashes, WaterCounts};
 use crate::weather::DryingClock;
 use crate::wetting::{DropQueue, SurfaceWater};
 
@@ -22,11 +22,12 @@ pub fn reset_scenario(world: &mut World) {
         &mut Weatherable,
         &mut SplatQueue,
         &mut SurfaceTotals,
+        &mut SurfaceTraces,
         Option<&mut CpuMaps>,
         Option<&mut SurfaceWater>,
         Option<&mut DropQueue>,
     )>();
-    for (mut surface, mut queue, mut totals, maps, water, drops) in surfaces.iter_mut(world) {
+    for (mut surface, mut queue, mut totals, mut traces, maps, water, drops) in surfaces.iter_mut(world) {
         if let Some(mut water) = water {
             water.reset();
         }
@@ -36,6 +37,8 @@ pub fn reset_scenario(world: &mut World) {
         // A changed surface gets new, empty maps on the GPU.
         surface.set_changed();
         queue.clear();
+        queue.restore_traces(SurfaceTraces::default());
+        *traces = SurfaceTraces::default();
         *totals = SurfaceTotals::default();
         if let Some(mut maps) = maps {
             *maps = CpuMaps::new(&surface);
@@ -47,4 +50,99 @@ pub fn reset_scenario(world: &mut World) {
     world.insert_resource(WaterCounts::default());
     world.insert_resource(DryingClock::default());
     world.insert_resource(Digest::default());
+    if let Some(mut splashes) = world.get_resource_mut::<Splashes>() {
+        *splashes = Splashes::default();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use bevy::asset::AssetPlugin;
+    use bevy::mesh::MeshPlugin;
+    use bevy::time::TimeUpdateStrategy;
+
+    use super::*;
+    use crate::WeatheringPlugins;
+    use crate::overlay::{CpuOverlayPlugin, GpuOverlayPlugin};
+    use crate::scenario::{Scenario, ScenarioPlugin, ScenarioStatus, amounts_digest};
+
+    const TAP: &str = r#"(
+        seconds: 3.0,
+        tick_hz: 20,
+        camera: (keys: [(eye: (0.0, 1.0, 2.0), target: (0.0, 0.0, 0.0))]),
+        materials: {"plain": ()},
+        surfaces: [(
+            name: "ground",
+            mesh: Ground(size: (1.0, 1.0), cells: (2, 2)),
+            material: "plain",
+            maps: (map_size: 32),
+        )],
+        emitters: [(
+            name: "tap",
+            effect: "tap.effect.ron",
+            rate: 50.0,
+            speed: 1.0,
+            spread_deg: 20.0,
+            keys: [(position: (0.0, 0.5, 0.0), target: (0.0, 0.0, 0.0))],
+        )],
+    )"#;
+
+    /// The scenario, when it is ready.
+    fn app(folder: &Path) -> App {
+        let paint = "(stamp_radius: 0.05, diffuse: (color: (0.4, 0.3, 0.2), opacity: 0.8))";
+        std::fs::write(folder.join("tap.effect.ron"), paint).unwrap();
+        let file = folder.join("tap.ron");
+        std::fs::write(&file, TAP).unwrap();
+        let scenario = ScenarioPlugin::new(Scenario::load(&file).unwrap(), false).unwrap();
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default(), MeshPlugin))
+            .add_plugins(WeatheringPlugins.build().disable::<GpuOverlayPlugin>())
+            .add_plugins((CpuOverlayPlugin, scenario))
+            .insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
+        app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(std::time::Duration::from_secs(3600));
+        app.finish();
+        app.cleanup();
+        for _ in 0..10_000 {
+            app.update();
+            match app.world().resource::<ScenarioStatus>() {
+                ScenarioStatus::Ready => return app,
+                ScenarioStatus::Loading => std::thread::sleep(std::time::Duration::from_millis(1)),
+                ScenarioStatus::Failed(error) => panic!("{error}"),
+            }
+        }
+        panic!("never ready");
+    }
+
+    /// Two seconds, and what came of them.
+    fn run(app: &mut App) -> (String, ParticleCounts, SurfaceTraces) {
+        app.insert_resource(TimeUpdateStrategy::FixedTimesteps(40));
+        app.update();
+        app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
+        let traces = traces(app);
+        let world = app.world_mut();
+        let mut waters = world.query::<&SurfaceWater>();
+        let digest = amounts_digest(world.resource::<Digest>(), waters.iter(world));
+        (digest, *world.resource::<ParticleCounts>(), traces)
+    }
+
+    fn traces(app: &mut App) -> SurfaceTraces {
+        let world = app.world_mut();
+        let mut traces = world.query::<&SurfaceTraces>();
+        *traces.single(world).unwrap()
+    }
+
+    #[test]
+    fn what_follows_is_what_followed_the_first_time() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut app = app(folder.path());
+        let first = run(&mut app);
+        assert!(first.1.hit > 20 && first.2 == SurfaceTraces { water: true, paint: true }, "{first:?}");
+        reset_scenario(app.world_mut());
+        // A frame without a tick, in which everybody sees that it is clean again.
+        app.update();
+        assert_eq!(traces(&mut app), SurfaceTraces::default());
+        assert_eq!(run(&mut app), first);
+    }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::emitter::EmitterShape;
+use crate::emitter::{EmitterShape, Flow, nozzle_speed};
 use crate::material::{PorousMaterial, StandingWater};
 use crate::overlay::Weatherable;
 use crate::scenes::stone::Stone;
@@ -47,7 +47,7 @@ pub struct Scenario {
     pub materials: BTreeMap<String, MaterialSpec>,
     /// What can get wet, at most [`Self::MAX_SURFACES`].
     pub surfaces: Vec<SurfaceSpec>,
-    /// What makes it wet.
+    /// What makes it wet, at most [`Self::MAX_EMITTERS`].
     #[serde(default)]
     pub emitters: Vec<EmitterSpec>,
 }
@@ -59,6 +59,8 @@ impl Scenario {
     pub const MAX_PARTICLES: u32 = 10_000_000;
     /// The most surfaces.
     pub const MAX_SURFACES: usize = 10_000;
+    /// The most emitters.
+    pub const MAX_EMITTERS: usize = 4096;
     /// The most particles an emitter sends per second.
     pub const MAX_RATE: f32 = 10_000_000.0;
     /// The most triangles of a generated mesh.
@@ -445,6 +447,16 @@ pub enum MeshSpec {
     File(String),
 }
 
+impl EmitterSpec {
+    /// m/s; 0 under a sky is as fast as the drops fall.
+    pub fn initial_speed(&self) -> f32 {
+        self.speed.unwrap_or(match (self.flow, self.shape) {
+            (Flow::LitresPerMinute(litres), EmitterShape::Cone { radius }) => nozzle_speed(litres, radius),
+            _ => 0.0,
+        })
+    }
+}
+
 /// An emitter that moves along its keys.
 #[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
 #[serde(deny_unknown_fields)]
@@ -458,8 +470,12 @@ pub struct EmitterSpec {
     /// Where on it they start.
     #[serde(default)]
     pub shape: EmitterShape,
-    /// m/s.
-    pub speed: f32,
+    /// How much it sends out.
+    #[serde(default)]
+    pub flow: Flow,
+    /// m/s. Not given: of a hose that of its flow, under a sky as fast as its drops fall.
+    #[serde(default)]
+    pub speed: Option<f32>,
     /// Half-angle of the cone of directions.
     #[serde(default)]
     pub spread_deg: f32,

@@ -15,7 +15,7 @@ use crate::collision::{BuildColliders, MeshColliders, NotWeatherable, SurfaceCol
 use crate::effect::{EffectTable, WeatherEffect};
 use crate::emitter::{EmissionSeed, Emitter};
 use crate::material::{PlayedWetMap, Playing};
-use crate::overlay::TexelArea;
+use crate::overlay::{FramesWork, PrepareStamps, TexelArea};
 use crate::particle::{Forces, ParticleConfig};
 use crate::schedule::{WeatheringSystems, WeatheringTick};
 use crate::wetting::{self, ExposureProgress, MeasureSurfaces};
@@ -79,7 +79,11 @@ impl Plugin for ScenarioPlugin {
             .init_resource::<Digest>()
             .add_systems(
                 PreUpdate,
-                watch_loading.run_if(is_loading).after(BuildColliders).after(MeasureSurfaces),
+                watch_loading
+                    .run_if(is_loading)
+                    .after(BuildColliders)
+                    .after(MeasureSurfaces)
+                    .after(PrepareStamps),
             )
             .add_systems(
                 WeatheringTick,
@@ -110,7 +114,8 @@ fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, loo
                 effect: handle,
                 rate: spec.rate,
                 shape: spec.shape,
-                speed: spec.speed,
+                flow: spec.flow,
+                speed: spec.initial_speed(),
                 spread: spec.spread_deg.to_radians(),
                 lifetime: spec.lifetime,
                 stream: index as u32,
@@ -238,6 +243,7 @@ fn watch_loading(
         ),
     >,
     exposure: Res<ExposureProgress>,
+    frames: Res<FramesWork>,
     mut status: ResMut<ScenarioStatus>,
     mut time: ResMut<Time<Virtual>>,
 ) {
@@ -255,7 +261,7 @@ fn watch_loading(
         *status = ScenarioStatus::Failed(current.0.content_error(&field, value, reason));
         return;
     }
-    if unfinished.is_empty() && colliders.building() == 0 && !exposure.is_busy() {
+    if unfinished.is_empty() && colliders.building() == 0 && !exposure.is_busy() && !frames.is_busy() {
         *status = ScenarioStatus::Ready;
         time.unpause();
     }

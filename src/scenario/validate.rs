@@ -10,13 +10,40 @@ use super::{
     SurfaceTextureSpec, TextureSpec,
 };
 use crate::clock::WeatheringClock;
-use crate::emitter::EmitterShape;
+use crate::emitter::{EmitterShape, Flow};
 use crate::material::OutOfRange;
 use crate::overlay::{TILE_SIZE, Weatherable};
 use crate::particle::Lifespan;
+use crate::weather::Weather;
+
+/// The strongest wind, m/s.
+const FASTEST: f32 = 1000.0;
 
 /// The farthest coordinate: beyond it an f32 is coarser than a drop.
 const FAR: f32 = 1.0e5;
+
+/// The first number of the weather that is out of its range.
+pub(crate) fn check_weather(weather: &Weather) -> Result<(), OutOfRange> {
+    let Weather { temperature_c, humidity, wind, sun_direction, sun_w_per_m2, drying_speed } = *weather;
+    let ranges = [
+        ("temperature_c", temperature_c, -40.0, 60.0),
+        ("humidity", humidity, 0.0, 1.0),
+        ("sun_w_per_m2", sun_w_per_m2, 0.0, 1400.0),
+        ("drying_speed", drying_speed, 0.0, 1.0e5),
+        ("wind.x", wind.x, -FASTEST, FASTEST),
+        ("wind.y", wind.y, -FASTEST, FASTEST),
+        ("wind.z", wind.z, -FASTEST, FASTEST),
+        ("sun_direction.x", sun_direction.x, -FAR, FAR),
+        ("sun_direction.y", sun_direction.y, -FAR, FAR),
+        ("sun_direction.z", sun_direction.z, -FAR, FAR),
+    ];
+    // Written so that NaN fails.
+    let wrong = ranges.into_iter().find(|(_, value, least, most)| !(value >= least && value <= most));
+    match wrong {
+        Some((field, value, least, most)) => Err(OutOfRange { field, value, least, most }),
+        None => Ok(()),
+    }
+}
 
 /// A product of absurd counts is as large as can be, not small.
 fn product(factors: [u64; 4]) -> u64 {
@@ -33,15 +60,12 @@ impl LoadedScenario {
         self.range("tick_hz", f64::from(scenario.tick_hz), 1.0, f64::from(WeatheringClock::MAX_HZ))?;
         self.positive("seconds", scenario.seconds, Scenario::MAX_SECONDS)?;
         self.vector("gravity", scenario.gravity, 1000.0)?;
-        self.vector("wind", scenario.wind, 1000.0)?;
+        self.vector("wind", scenario.wind, FASTEST)?;
         let most = f64::from(Scenario::MAX_PARTICLES);
         self.range("max_particles", f64::from(scenario.max_particles), 1.0, most)?;
-        let weather = &scenario.weather;
-        self.range("weather.temperature_c", f64::from(weather.temperature_c), -40.0, 60.0)?;
-        self.not_negative("weather.humidity", weather.humidity, 1.0)?;
-        self.not_negative("weather.sun_w_per_m2", weather.sun_w_per_m2, 1400.0)?;
-        self.not_negative("weather.drying_speed", weather.drying_speed, 1.0e5)?;
         self.validate_view()?;
+        // Wind and direction of the sun have been checked by their own names.
+        check_weather(&scenario.weather()).map_err(|wrong| self.out_of_range("weather", wrong))?;
         for (name, material) in &scenario.materials {
             self.validate_material(&format!("materials.{name}"), material)?;
         }
@@ -62,6 +86,10 @@ impl LoadedScenario {
             if !names.insert(&surface.name) {
                 return Err(self.value(format!("{field}.name"), &surface.name, "unique"));
             }
+        }
+        if scenario.emitters.len() > Scenario::MAX_EMITTERS {
+            let expected = format!("at most {} (MAX_EMITTERS)", Scenario::MAX_EMITTERS);
+            return Err(self.value("emitters", scenario.emitters.len(), expected));
         }
         for (index, emitter) in scenario.emitters.iter().enumerate() {
             self.validate_emitter(&format!("emitters[{index}]"), emitter)?;
@@ -103,12 +131,7 @@ impl LoadedScenario {
         }
         for (name, checked) in [("porous", material.porous.validate()), ("water", material.water.validate())]
         {
-            let OutOfRange { field: inner, value, least, most } = match checked {
-                Ok(()) => continue,
-                Err(error) => error,
-            };
-            let expected = format!("{least} to {most}");
-            return Err(self.value(format!("{field}.{name}.{inner}"), value, expected));
+            checked.map_err(|wrong| self.out_of_range(&format!("{field}.{name}"), wrong))?;
         }
         self.positive(&format!("{field}.tiles.x"), material.tiles.x, 1.0e4)?;
         self.positive(&format!("{field}.tiles.y"), material.tiles.y, 1.0e4)?;
@@ -207,7 +230,16 @@ impl LoadedScenario {
     fn validate_emitter(&self, field: &str, emitter: &EmitterSpec) -> Result<(), ScenarioError> {
         self.resolve(&format!("{field}.effect"), &emitter.effect)?;
         self.not_negative(&format!("{field}.rate"), emitter.rate, Scenario::MAX_RATE)?;
-        self.not_negative(&format!("{field}.speed"), emitter.speed, 1000.0)?;
+        self.not_negative(&format!("{field}.speed"), emitter.initial_speed(), 1000.0)?;
+        match emitter.flow {
+            Flow::Effect => {}
+            Flow::MmPerHour(rate) => self.positive(&format!("{field}.flow"), rate, 10_000.0)?,
+            Flow::LitresPerMinute(litres) => self.positive(&format!("{field}.flow"), litres, 10_000.0)?,
+        }
+        if matches!(emitter.flow, Flow::MmPerHour(_)) && !matches!(emitter.shape, EmitterShape::Sky { .. }) {
+            let expected = "a shape of Sky with it".to_owned();
+            return Err(self.value(format!("{field}.flow"), "MmPerHour", expected));
+        }
         self.not_negative(&format!("{field}.spread_deg"), emitter.spread_deg, 180.0)?;
         let longest = f32::from(Lifespan::MAX_TICKS) / self.scenario.tick_hz as f32;
         self.positive(&format!("{field}.lifetime"), emitter.lifetime, longest.min(3600.0))?;
@@ -296,6 +328,11 @@ impl LoadedScenario {
         } else {
             Err(self.value(field, value, format!("{least} to {most}")))
         }
+    }
+
+    fn out_of_range(&self, field: &str, wrong: OutOfRange) -> ScenarioError {
+        let OutOfRange { field: inner, value, least, most } = wrong;
+        self.value(format!("{field}.{inner}"), value, format!("{least} to {most}"))
     }
 
     fn value(

@@ -16,4 +16,5 @@ pub mod environment;
 pub mod gltf_mesh;
 pub mod meshes;
 pub mod mips;
+pub(crate) mod noise;
 pub mod stone;

@@ -106,7 +106,7 @@ fn crossing(heights: &[u32], left: usize, right: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wetmap::{hash, unit};
+    use crate::scenes::noise::{hash, unit};
 
     fn brute_force(inside: &[bool], width: usize) -> Vec<f32> {
         let away = |i: usize, j: usize| {

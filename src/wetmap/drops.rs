@@ -1,12 +1,11 @@
-//! The first drops of a shower: points and short lines, painted while it rains.
+//! The first drops of a shower: points and short lines.
 //!
 //! A drop is a round spot or, where it runs, a line that leads down the map (towards higher v), a little
 //! aslant. Either is 1 in its middle and falls to its rim, so that it dries from there. Where drops overlap,
 //! the higher counts, and what leaves the map at one edge comes in at the other.
 //!
-//! A [`DropsPainter`] paints as many as are due, so that its map can be laid over another at any time:
-//! `wet.add(painter.map())` is the paper's `saturate(wet + drops)`. All painted at once by [`drops`], they
-//! are the same. What a drop is like depends on its number and the seed alone.
+//! Laid over another map, `wet.add(&drops)` is the paper's `saturate(wet + drops)`. What a drop is like depends
+//! on its number and the seed alone, so a shower goes on with more of them.
 //!
 //! Hnat et al. 2006, *Real-time wetting of porous media*, on rain.
 
@@ -14,7 +13,8 @@ use bevy::math::Vec2;
 use rand_pcg::Pcg32;
 use rand_pcg::rand_core::Rng;
 
-use super::{GreyMap, WetMapError, check_range, unit};
+use super::{GreyMap, WetMapError, check_range};
+use crate::scenes::noise::unit;
 
 /// What drops are like. Lengths in texels.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,29 +50,21 @@ const LEAN: f32 = 0.15;
 /// # Errors
 /// [`WetMapError::Parameter`].
 pub fn drops(options: &DropsOptions) -> Result<GreyMap, WetMapError> {
-    let mut painter = DropsPainter::new(options, 1.0)?;
+    let mut painter = DropsPainter::new(options)?;
     painter.paint(options.drops);
     Ok(painter.map)
 }
 
-/// Paints drops as they fall, until all have.
-#[derive(Debug, Clone)]
-pub struct DropsPainter {
+/// Paints drops, one after the other.
+struct DropsPainter {
     options: DropsOptions,
-    per_second: f64,
     rng: Pcg32,
     map: GreyMap,
-    painted: u32,
-    /// Part of the next drop that is due.
-    owed: f64,
 }
 
 impl DropsPainter {
-    /// An empty map, and a shower of `per_second` drops (0 to 1,000,000) all over it.
-    ///
-    /// # Errors
-    /// [`WetMapError::Parameter`].
-    pub fn new(options: &DropsOptions, per_second: f32) -> Result<Self, WetMapError> {
+    /// An empty map.
+    fn new(options: &DropsOptions) -> Result<Self, WetMapError> {
         let size = options.size;
         check_range("size", size, 8..=GreyMap::MAX_SIZE)?;
         check_range("drops", options.drops, 0..=1_000_000)?;
@@ -81,40 +73,11 @@ impl DropsPainter {
         check_range("radius.max", most, 0.75..=size as f32 / 4.0)?;
         check_range("radius.min", least, 0.75..=most)?;
         check_range("line_length", options.line_length, 0.0..=size as f32)?;
-        check_range("per_second", per_second, 0.0..=1.0e6)?;
         Ok(Self {
             options: *options,
-            per_second: per_second.into(),
             rng: Pcg32::new(options.seed, 0),
             map: GreyMap::new(size, size, vec![0.0; size as usize * size as usize])?,
-            painted: 0,
-            owed: 0.0,
         })
-    }
-
-    /// The drops so far.
-    pub fn map(&self) -> &GreyMap {
-        &self.map
-    }
-
-    /// How many they are.
-    pub fn painted(&self) -> u32 {
-        self.painted
-    }
-
-    /// Lets it rain on, and paints the drops that fall: returns how many. Part of a drop is owed until the
-    /// next time. Nothing happens for times that are not above 0, or when all drops have fallen.
-    pub fn advance(&mut self, seconds: f32) -> u32 {
-        let goes_on = seconds > 0.0 && self.painted < self.options.drops;
-        if !goes_on {
-            return 0;
-        }
-        self.owed += f64::from(seconds) * self.per_second;
-        // A cast saturates, and what is left is less.
-        let due = (self.owed as u32).min(self.options.drops - self.painted);
-        self.owed -= f64::from(due);
-        self.paint(due);
-        due
     }
 
     fn paint(&mut self, count: u32) {
@@ -132,7 +95,6 @@ impl DropsPainter {
                 self.stamp(start, Vec2::ZERO, radius);
             }
         }
-        self.painted += count;
     }
 
     /// Paints all that lies within `radius` of the line from `start` along `run`.
@@ -163,27 +125,21 @@ mod tests {
 
     #[test]
     fn all_at_once_or_one_after_the_other_they_are_the_same() {
-        let mut painter = DropsPainter::new(&small(), 7.0).unwrap();
-        assert_eq!(painter.advance(f32::NAN) + painter.advance(-1.0) + painter.advance(0.1), 0);
-        let mut steps = 0;
-        while painter.painted() < 40 {
-            let before = painter.map().clone();
-            let due = painter.advance(0.25);
-            assert!((0..=2).contains(&due));
-            assert!(painter.map().values.iter().zip(&before.values).all(|(after, before)| after >= before));
-            steps += 1;
+        let mut painter = DropsPainter::new(&small()).unwrap();
+        for count in [1, 0, 9, 30] {
+            let before = painter.map.clone();
+            painter.paint(count);
+            assert!(painter.map.values.iter().zip(&before.values).all(|(after, before)| after >= before));
+            assert_eq!(painter.map != before, count > 0, "{count}");
         }
-        // 40 drops at 7 a second, a tenth of which had passed.
-        assert_eq!(steps, 23);
-        assert_eq!(painter.advance(1.0e9), 0);
-        assert_eq!(painter.map(), &drops(&small()).unwrap());
+        assert_eq!(painter.map, drops(&small()).unwrap());
     }
 
     #[test]
     fn spots_are_round_and_go_on_round_the_edges() {
-        let mut painter = DropsPainter::new(&small(), 1.0).unwrap();
+        let mut painter = DropsPainter::new(&small()).unwrap();
         painter.stamp(Vec2::new(63.5, 0.5), Vec2::ZERO, 4.0);
-        let map = painter.map();
+        let map = painter.map;
         assert_eq!(map.get(63, 0), 1.0);
         for (x, y) in [(0, 0), (62, 0), (63, 1), (63, 63)] {
             assert!((map.get(x, y) - 15.0 / 16.0).abs() < 1e-6, "{x} {y}: {}", map.get(x, y));
@@ -226,6 +182,5 @@ mod tests {
         assert!(error(DropsOptions { radius: [1.0, 17.0], ..small() }).contains("`radius.max` is 17"));
         assert!(error(DropsOptions { radius: [3.0, 2.0], ..small() }).contains("`radius.min` is 3"));
         assert!(error(DropsOptions { line_length: -1.0, ..small() }).contains("`line_length`"));
-        assert!(DropsPainter::new(&small(), f32::INFINITY).is_err());
     }
 }

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::picture::PictureError;
+
 /// Why a wet map could not be made, read or written.
 #[derive(thiserror::Error, Debug)]
 #[non_exhaustive]
@@ -85,22 +87,9 @@ pub enum WetMapError {
         /// The file.
         path: PathBuf,
     },
-    /// A file could not be read or written.
-    #[error("{}: {source}", .path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// A file is no picture, or cannot be encoded.
-    #[error("{}: {source}", .path.display())]
-    Image {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: image::ImageError,
-    },
+    /// A file could not be read or written, is no picture, or too large a one.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
     /// A file is a picture, but no map.
     #[error("{}: {source}", .path.display())]
     Content {

@@ -4,14 +4,12 @@
 //! `.exr`, where all three channels are the same (the encoder knows no grey ones). A photograph is light: a
 //! `.png` is decoded from sRGB, an `.exr` is linear already.
 
-use std::fs::File;
-use std::io::{BufReader, Cursor};
 use std::path::Path;
 
-use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader, Limits, Luma, Rgb32FImage};
+use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, Rgb32FImage};
 
-use super::{GreyMap, WetMapError, check_size};
-use crate::output::write_atomic;
+use super::{GreyMap, WetMapError};
+use crate::picture::{read_picture, write_picture};
 use crate::scenes::mips::linear_from_srgb;
 
 /// Of linear sRGB: how bright each channel looks.
@@ -26,8 +24,8 @@ pub(super) fn luminance([r, g, b]: [f32; 3]) -> f32 {
 /// one the luminance of its values counts, as they are; transparency does not.
 ///
 /// # Errors
-/// [`WetMapError::Extension`], [`WetMapError::File`], [`WetMapError::Image`]; [`WetMapError::Content`] if it
-/// is too large, or if a value is NaN or outside 0..=1.
+/// [`WetMapError::Extension`], [`WetMapError::Picture`]; [`WetMapError::Content`] if a value is NaN or outside
+/// 0..=1.
 pub fn read_map(path: &Path) -> Result<GreyMap, WetMapError> {
     let picture = read(path)?;
     let (width, height) = (picture.width(), picture.height());
@@ -44,8 +42,7 @@ pub fn read_map(path: &Path) -> Result<GreyMap, WetMapError> {
 /// side.
 ///
 /// # Errors
-/// [`WetMapError::Extension`], [`WetMapError::File`], [`WetMapError::Image`]; [`WetMapError::Content`] if it
-/// is too large.
+/// [`WetMapError::Extension`], [`WetMapError::Picture`].
 pub fn read_photo(path: &Path) -> Result<Rgb32FImage, WetMapError> {
     let is_light = format_of(path)? == ImageFormat::OpenExr;
     let mut photo = read(path)?.into_rgb32f();
@@ -61,7 +58,8 @@ pub fn read_photo(path: &Path) -> Result<Rgb32FImage, WetMapError> {
 /// bit.
 ///
 /// # Errors
-/// [`WetMapError::Extension`], [`WetMapError::File`], [`WetMapError::Image`].
+/// [`WetMapError::Extension`], [`WetMapError::Picture`]; [`WetMapError::Content`] if its values are not as many as
+/// its texels.
 pub fn write_map(path: &Path, map: &GreyMap) -> Result<(), WetMapError> {
     let format = format_of(path)?;
     let content = |source| WetMapError::Content { path: path.into(), source: Box::new(source) };
@@ -80,11 +78,7 @@ pub fn write_map(path: &Path, map: &GreyMap) -> Result<(), WetMapError> {
         let values = map.values.iter().flat_map(|&value| [value; 3]).collect();
         Rgb32FImage::from_raw(map.width, map.height, values).ok_or_else(|| content(missing()))?.into()
     };
-    let mut bytes = Cursor::new(Vec::new());
-    picture
-        .write_to(&mut bytes, format)
-        .map_err(|source| WetMapError::Image { path: path.into(), source })?;
-    write_atomic(path, bytes.get_ref()).map_err(|source| WetMapError::File { path: path.into(), source })
+    Ok(write_picture(path, &picture, format)?)
 }
 
 /// That a map can be written under this name: better before the work than after it.
@@ -105,19 +99,7 @@ fn format_of(path: &Path) -> Result<ImageFormat, WetMapError> {
 }
 
 fn read(path: &Path) -> Result<DynamicImage, WetMapError> {
-    let format = format_of(path)?;
-    let image = |source| WetMapError::Image { path: path.into(), source };
-    let file = File::open(path).map_err(|source| WetMapError::File { path: path.into(), source })?;
-    let mut reader = ImageReader::with_format(BufReader::new(file), format);
-    let mut limits = Limits::default();
-    limits.max_alloc = Some(4 << 30);
-    reader.limits(limits);
-    let decoder = reader.into_decoder().map_err(image)?;
-    // Asked here and not left to the reader's limits, whose error does not say what is allowed.
-    let (width, height) = decoder.dimensions();
-    check_size(width, height)
-        .map_err(|source| WetMapError::Content { path: path.into(), source: Box::new(source) })?;
-    DynamicImage::from_decoder(decoder).map_err(image)
+    Ok(read_picture(path, format_of(path)?, GreyMap::MAX_SIZE)?)
 }
 
 #[cfg(test)]

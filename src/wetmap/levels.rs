@@ -161,7 +161,7 @@ fn smoothed(bins: &[u64]) -> Vec<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wetmap::{hash, unit};
+    use crate::scenes::noise::{hash, unit};
 
     /// Numbers around 0 with this standard deviation: sums of twelve even ones.
     fn noise(seed: u32, count: u32, deviation: f32) -> impl Iterator<Item = f32> {

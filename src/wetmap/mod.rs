@@ -12,7 +12,7 @@
 //! | [`from_photos`] | two photographs of one surface, dry and wet | splats that dry from their rims |
 //! | [`perlin()`] | a seed | a soaked surface that dries unevenly |
 //! | [`exposure()`] | rays towards the rain | shelter under roofs and on the lee side |
-//! | [`drops()`] | a seed | the first drops; a [`DropsPainter`] adds them while it rains |
+//! | [`drops()`] | a seed | the first drops |
 //!
 //! Maps are put together by [`GreyMap::add`], as drops over exposure. [`read_map`] and [`write_map`] keep
 //! them in files. The rays serve drying, too: [`accessibility`] says how open a point lies,
@@ -44,7 +44,7 @@ mod rays;
 use std::fmt::Display;
 use std::ops::RangeInclusive;
 
-pub use drops::{DropsOptions, DropsPainter, drops};
+pub use drops::{DropsOptions, drops};
 pub use error::WetMapError;
 pub use exposure::{ExposureOptions, RainSource, exposure};
 pub use file::{check_map_name, read_map, read_photo, write_map};
@@ -134,21 +134,6 @@ fn check_range<T: PartialOrd + Display>(
     }
     let expected = format!("{} to {}", range.start(), range.end());
     Err(WetMapError::Parameter { name, value: value.to_string(), expected })
-}
-
-/// Three numbers stirred into one: the finaliser of MurmurHash3 after each.
-fn hash(numbers: [u32; 3]) -> u32 {
-    numbers.into_iter().fold(0x9e37_79b9, |hash, number| {
-        let mut h = hash ^ number.wrapping_mul(0xcc9e_2d51);
-        h = (h ^ (h >> 16)).wrapping_mul(0x85eb_ca6b);
-        h = (h ^ (h >> 13)).wrapping_mul(0xc2b2_ae35);
-        h ^ (h >> 16)
-    })
-}
-
-/// 32 random bits as a number from 0 up to, but not including, 1: the upper 24, the most that an `f32` holds.
-fn unit(bits: u32) -> f32 {
-    (bits >> 8) as f32 / 16_777_216.0
 }
 
 #[cfg(test)]

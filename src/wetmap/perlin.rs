@@ -1,17 +1,17 @@
 //! A wet map of noise: a soaked surface that dries unevenly, or a damp one that gets wet so.
 //!
-//! Fractal Perlin noise is laid over the tile. Towards its end, over the last quarter of either axis, it is
-//! exchanged for the noise from before its beginning, so that the map goes on round its edges; the weights
-//! are chosen so that the exchange keeps the contrast. Then each texel is given its rank among all of them
-//! for a value. Noise prefers middling values, ranks are spread evenly: played linearly in time, the wet area
-//! grows by the same in every second.
+//! Fractal Perlin noise is laid over the tile, so that the map goes on round its edges. Then each texel is given
+//! its rank among all of them for a value. Noise prefers middling values, ranks are spread evenly: played
+//! linearly in time, the wet area grows by the same in every second.
 //!
 //! Perlin 2002, *Improving noise*; Hnat et al. 2006 for the use.
 
-use fastnoise_lite::{FastNoiseLite, FractalType, NoiseType};
+use bevy::math::Vec2;
+use fastnoise_lite::NoiseType;
 
 use super::parallel::fill;
-use super::{GreyMap, WetMapError, check_range, check_size, hash};
+use super::{GreyMap, WetMapError, check_range, check_size};
+use crate::scenes::noise::{Noise, hash};
 
 /// What a map of noise is like.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,14 +49,15 @@ pub fn perlin(options: &PerlinOptions) -> Result<GreyMap, WetMapError> {
     check_range("cycles", cycles, 0.5..=1024.0)?;
     check_range("octaves", octaves, 1..=12)?;
     check_range("coverage", coverage, 0.0..=1.0)?;
-    let noise = TiledNoise::new(seed, cycles, octaves);
+    let seed = hash([seed as u32, (seed >> 32) as u32, 3]);
+    let noise = Noise::new(NoiseType::Perlin, seed, Vec2::splat(cycles), octaves as i32);
     let width = size as usize;
     let mut heights = vec![0.0f32; width * width];
     fill(&mut heights, ROWS * width, |first, chunk| {
         for (i, height) in chunk.iter_mut().enumerate() {
             let at = first + i;
             let along = |texel: usize| (texel as f32 + 0.5) / size as f32;
-            *height = noise.at(along(at % width), along(at / width));
+            *height = noise.at(Vec2::new(along(at % width), along(at / width)));
         }
     });
     GreyMap::new(size, size, ranked(&heights, coverage))
@@ -73,52 +74,6 @@ fn ranked(heights: &[f32], coverage: f32) -> Vec<f32> {
         ranks[at as usize] = ((rank + 1) as f64 / wet as f64) as f32;
     }
     ranks
-}
-
-/// Fractal noise that repeats over the unit square.
-struct TiledNoise {
-    source: FastNoiseLite,
-    cycles: f32,
-}
-
-impl TiledNoise {
-    fn new(seed: u64, cycles: f32, octaves: u32) -> Self {
-        let octaves = octaves as i32;
-        // Each octave counts the seed up by one.
-        let seed = (hash([seed as u32, (seed >> 32) as u32, 3]) as i32).min(i32::MAX - octaves);
-        let mut source = FastNoiseLite::with_seed(seed);
-        source.set_noise_type(Some(NoiseType::Perlin));
-        source.set_frequency(Some(1.0));
-        source.set_fractal_type(Some(FractalType::FBm));
-        source.set_fractal_octaves(Some(octaves));
-        Self { source, cycles }
-    }
-
-    /// At a point of the square; about -1 to 1.
-    fn at(&self, u: f32, v: f32) -> f32 {
-        let (late_u, late_v) = (exchanged(u), exchanged(v));
-        let (early_u, early_v) = (1.0 - late_u, 1.0 - late_v);
-        let mut sum = 0.0;
-        for (u, v, weight) in [
-            (u, v, early_u * early_v),
-            (u - 1.0, v, late_u * early_v),
-            (u, v - 1.0, early_u * late_v),
-            (u - 1.0, v - 1.0, late_u * late_v),
-        ] {
-            if weight > 0.0 {
-                sum += weight * self.source.get_noise_2d(u * self.cycles, v * self.cycles);
-            }
-        }
-        // Of two independent noises, what adds up is their variances.
-        let variance = |late: f32, early: f32| late * late + early * early;
-        sum / (variance(late_u, early_u) * variance(late_v, early_v)).sqrt()
-    }
-}
-
-/// How much of the noise is that from before the beginning: none in the first three quarters, at the end all.
-fn exchanged(along: f32) -> f32 {
-    let t = ((along - 0.75) * 4.0).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
 }
 
 #[cfg(test)]

@@ -173,7 +173,7 @@ mod tests {
     use image::Rgb;
 
     use super::*;
-    use crate::wetmap::{hash, unit};
+    use crate::scenes::noise::{hash, unit};
 
     const SIDE: u32 = 160;
 

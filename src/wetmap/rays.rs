@@ -9,8 +9,8 @@ use std::f32::consts::TAU;
 use bevy::math::{Vec2, Vec3};
 
 use super::parallel::fill;
-use super::{hash, unit};
 use crate::collision::CollisionScene;
+use crate::scenes::noise::{hash, unit};
 use crate::wetting::SurfacePoint;
 
 /// Points that a thread takes at a time.

@@ -43,9 +43,9 @@ pub struct DripEffect {
 /// A drop of 3.6 mm.
 pub fn drip_effect() -> WeatherEffect {
     WeatherEffect {
-        water_mm3: 25.0,
-        terminal_speed: 8.3,
-        stamp_radius: 0.011,
+        volume_mm3: 25.0,
+        terminal_speed: Some(8.3),
+        stamp_radius: Some(0.011),
         stamp_radius_jitter: 0.3,
         ..default()
     }
@@ -85,6 +85,7 @@ pub(super) fn shed_drips(
                 volume_nl: drip.water_nl,
                 sequence,
                 effect: index,
+                class: 0,
             });
         }
     }

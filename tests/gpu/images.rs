@@ -45,7 +45,7 @@ fn draw(surface: Option<PorousMaterial>, metallic: f32, water_mm: f32) -> Option
         let place = Transform::from_xyz(0.0, height, 0.0);
         let mut entity = app.world_mut().spawn((Mesh3d(mesh), MeshMaterial3d(material.clone()), place));
         if let Some(porous) = surface {
-            let maps = Weatherable { map_size: 64, wrap_u: Wrap::Repeat, wrap_v: Wrap::Clamp };
+            let maps = Weatherable { map_size: 64, wrap_u: Wrap::Repeat, wrap_v: Wrap::Clamp, ..default() };
             surfaces.push(entity.insert((maps, porous)).id());
         }
     }

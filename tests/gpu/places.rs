@@ -78,7 +78,7 @@ fn draw(place: &Place, porous: Option<f32>) -> Option<RgbImage> {
     ));
     (place.scene)(world, camera, ball);
     if let Some(alpha_poro) = porous {
-        let maps = Weatherable { map_size: 64, wrap_u: Wrap::Repeat, wrap_v: Wrap::Clamp };
+        let maps = Weatherable { map_size: 64, wrap_u: Wrap::Repeat, wrap_v: Wrap::Clamp, ..default() };
         let model = WettingModel::Hnat(Pores { alpha_poro, ..default() });
         for surface in [ball, floor] {
             // All that falls goes into the pores: no film.

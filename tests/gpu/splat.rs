@@ -2,9 +2,13 @@
 
 use bevy::prelude::*;
 use bevy::render::gpu_readback::Readback;
+use bevy_weathering::collision::MeshTriangles;
+use bevy_weathering::effect::StampSource;
 use bevy_weathering::overlay::{
-    CpuMaps, Overlays, RainRing, Splat, SplatQueue, SplatStats, Weatherable, Wrap,
+    CpuMaps, Overlays, RainRing, Splat, SplatQueue, SplatStats, StampAtlas, SurfaceFrames, Weatherable, Wrap,
 };
+
+use bevy_weathering::stamps::StampKind;
 
 use super::app::{app, read_back, update, update_until};
 
@@ -32,7 +36,7 @@ fn random_splats(count: u32, mut seed: u64) -> Vec<Splat> {
                 specular: next(u32::MAX),
                 bump: next(255) as i32 - 127,
                 bump_opacity: next(256),
-                pad: [0; 2],
+                ..bytemuck::Zeroable::zeroed()
             }
         })
         .collect()
@@ -81,14 +85,14 @@ fn gpu_and_cpu_agree_to_the_bit_for_every_edge_behaviour() {
         (Wrap::Repeat, Wrap::Clamp),
         (Wrap::Clamp, Wrap::Clamp),
     ] {
-        let surface = Weatherable { map_size: SIZE, wrap_u, wrap_v };
+        let surface = Weatherable { map_size: SIZE, wrap_u, wrap_v, ..default() };
         let entity = spawn_surface(&mut app, surface);
         let splats = random_splats(600, 42);
         let mut reference = CpuMaps::new(&surface);
         // In two batches, so that a pass begins on maps that are not empty.
         for batch in splats.chunks(350) {
             push(&mut app, entity, batch);
-            reference.paint(batch);
+            reference.paint(batch, &StampAtlas::default(), None);
             all += batch.len() as u64;
             painted(&mut app, all);
         }
@@ -99,10 +103,73 @@ fn gpu_and_cpu_agree_to_the_bit_for_every_edge_behaviour() {
     }
 }
 
+/// The stamps of mud and of flakes, in the app and by themselves.
+fn add_stamps(app: &mut App) -> StampAtlas {
+    for stamps in [StampSource::Kind(StampKind::Splat), StampSource::Kind(StampKind::Flakes)] {
+        let set = stamps.read(&Default::default()).unwrap().unwrap();
+        app.world_mut().resource_mut::<StampAtlas>().add(&set).unwrap();
+    }
+    app.world().resource::<StampAtlas>().clone()
+}
+
+#[test]
+fn stamps_that_are_turned_and_stamps_in_space_are_the_same_to_the_bit() {
+    let Some(mut app) = app() else { return };
+    let atlas = add_stamps(&mut app);
+    let wrap = [Wrap::Repeat, Wrap::Clamp];
+    let surface = Weatherable { map_size: SIZE, wrap_u: wrap[0], wrap_v: wrap[1], ..default() };
+    let triangles = MeshTriangles::from_mesh(&Sphere::new(1.0).mesh().uv(24, 16)).unwrap();
+    let frames = SurfaceFrames::new(&triangles, SIZE, wrap);
+    let entity = spawn_surface(&mut app, surface);
+    app.world_mut().entity_mut(entity).insert(frames.clone());
+    let mut seed = 77u32;
+    let mut next = |below: i32| {
+        seed = seed.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+        ((seed >> 8) % below as u32) as i32
+    };
+    let mut splats = random_splats(400, 5);
+    for (number, splat) in splats.iter_mut().enumerate() {
+        splat.stamp = [0, 1 + number as u32 % atlas.len(), 4_000_000]
+            [if number % 40 == 0 { 2 } else { number % 3 % 2 }];
+        splat.row_s = [next(4000) - 2000, next(4000) - 2000, 0];
+        splat.row_t = [next(4000) - 2000, next(4000) - 2000, 0];
+        if number % 2 == 0 {
+            continue;
+        }
+        // Anywhere on the sphere, turned any way.
+        let at = frames.texels()[next((SIZE * SIZE) as i32) as usize].place().unwrap_or([9, 9, 9]);
+        let radius = 1500 + next(9000);
+        let turn = Quat::from_euler(EulerRot::XYZ, next(628) as f32 / 100.0, next(628) as f32 / 100.0, 0.0);
+        let axes = [turn * Vec3::X, turn * Vec3::Y, turn * Vec3::Z];
+        let scale = 256.0 / radius as f32 * 65_536.0;
+        let row = |axis: Vec3| (axis * scale).round().as_ivec3().to_array();
+        let packed = |axis: Vec3| {
+            let [x, y, z] = (axis * 127.0).round().to_array().map(|part| part as i8 as u8);
+            u32::from_le_bytes([x, y, z, 0])
+        };
+        [splat.row_s, splat.row_t, splat.row_n] = axes.map(row);
+        [splat.axis_s, splat.axis_t, splat.axis_n] = axes.map(packed);
+        (splat.origin, splat.reach, splat.in_space) = (at, 2 * radius, 1);
+    }
+    let mut reference = CpuMaps::new(&surface);
+    reference.paint(&splats, &atlas, Some(&frames));
+    push(&mut app, entity, &splats);
+    painted(&mut app, splats.len() as u64);
+    let maps = maps_of(&mut app, entity, &surface);
+    let differing = |a: &[[u8; 4]], b: &[[u8; 4]]| a.iter().zip(b).filter(|(a, b)| a != b).count();
+    assert_eq!(differing(&maps.diffuse, &reference.diffuse), 0);
+    assert_eq!(differing(&maps.specular, &reference.specular), 0);
+    assert_eq!(differing(&maps.normal, &reference.normal), 0);
+    // The same without those in space is another picture.
+    let mut flat = CpuMaps::new(&surface);
+    flat.paint(&splats, &atlas, None);
+    assert!(differing(&flat.diffuse, &maps.diffuse) > 2000);
+}
+
 #[test]
 fn a_stamp_in_the_corner_deposits_what_one_in_the_middle_does() {
     let Some(mut app) = app() else { return };
-    let surface = Weatherable { map_size: SIZE, wrap_u: Wrap::Repeat, wrap_v: Wrap::Repeat };
+    let surface = Weatherable { map_size: SIZE, wrap_u: Wrap::Repeat, wrap_v: Wrap::Repeat, ..default() };
     let (corner, middle) = (spawn_surface(&mut app, surface), spawn_surface(&mut app, surface));
     let mut splat = Splat { center: [40, 200], ..random_splats(1, 9)[0] };
     (splat.radius, splat.water_nl) = ([1700, 2300], 4_188_790);

@@ -37,7 +37,7 @@ impl Scene {
         transform: Transform,
     ) -> Entity {
         let mesh = self.0.world_mut().resource_mut::<Assets<Mesh>>().add(mesh);
-        let maps = Weatherable { map_size: size, wrap_u: Wrap::Clamp, wrap_v: Wrap::Clamp };
+        let maps = Weatherable { map_size: size, wrap_u: Wrap::Clamp, wrap_v: Wrap::Clamp, ..default() };
         let surface = self
             .0
             .world_mut()
@@ -54,7 +54,12 @@ impl Scene {
     }
 
     pub fn emit(&mut self, emitter: Emitter, water_mm3: f32, stamp_radius: f32, at: Vec3) -> Entity {
-        let effect = WeatherEffect { water_mm3, stamp_radius, terminal_speed: 6.5, ..default() };
+        let effect = WeatherEffect {
+            volume_mm3: water_mm3,
+            stamp_radius: Some(stamp_radius),
+            terminal_speed: Some(6.5),
+            ..default()
+        };
         let effect = self.0.world_mut().resource_mut::<Assets<WeatherEffect>>().add(effect);
         self.0.world_mut().spawn((Emitter { effect, ..emitter }, Transform::from_translation(at))).id()
     }

@@ -40,19 +40,19 @@ pub struct ReplayArgs {
     /// Size of the pictures
     #[arg(long, default_value = "640x360", value_parser = parse_size)]
     pub size: UVec2,
-    /// Seconds of weather time, in place of the scenario's
+    /// Seconds of weather time from the start, in place of the scenario's
     #[arg(long)]
     pub seconds: Option<f32>,
     /// Seed, in place of the scenario's
-    #[arg(long)]
+    #[arg(long, conflicts_with = "resume")]
     pub seed: Option<u64>,
-    /// Threads to compute with [default: all cores]
+    /// Threads to compute ticks with; how open surfaces lie is found out by all cores [default: all cores]
     #[arg(long)]
     pub threads: Option<usize>,
-    /// Go on from a folder written by --save-state
+    /// Go on from a folder written by --save-state; of the pictures in --out, those from before stay
     #[arg(long)]
     pub resume: Option<PathBuf>,
-    /// Folder to save the scene into at the end, to go on from
+    /// Folder to save the scene into at the end, to go on from; holds nothing else
     #[arg(long)]
     pub save_state: Option<PathBuf>,
     /// Simulate only; needs no graphics driver, and gives the same digest

@@ -5,11 +5,13 @@
 //! | `mod` | [`MeshBvh`]: the triangles of a mesh at rest, built once, shared by all that show it |
 //! | `deforming` | [`DeformingBvh`]: the triangles of one surface that is posed, refitted when it moves |
 //! | `boxes` | [`BoxBvh`]: the boxes of all surfaces |
+//! | `overlaps` | nothing: [`BoxOverlaps`] tells which of many boxes overlap one |
 //!
 //! obvhs has a glam of its own version; values cross over as arrays, so that no lock file can make them differ.
 
 mod boxes;
 mod deforming;
+mod overlaps;
 
 use bevy::prelude::*;
 use obvhs::BvhBuildParams;
@@ -24,6 +26,7 @@ use super::{Deformer, MeshTriangles};
 
 pub(super) use boxes::BoxBvh;
 pub(super) use deforming::DeformingBvh;
+pub(crate) use overlaps::BoxOverlaps;
 
 /// Above this many triangles a faster build is worth a slower cast.
 const FAST_BUILD_TRIANGLES: usize = 200_000;

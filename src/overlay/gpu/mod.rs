@@ -33,6 +33,7 @@ impl Plugin for GpuOverlayPlugin {
             return;
         }
         load_shader_library!(app, "../../../shaders/common/kernel.wgsl");
+        load_shader_library!(app, "../../../shaders/common/stamp.wgsl");
         embedded_asset!(app, "../../../shaders/splat.wgsl");
 
         let stats = SplatStats::default();
@@ -43,8 +44,9 @@ impl Plugin for GpuOverlayPlugin {
             .insert_resource(stats)
             .init_resource::<prepare::PendingSplats>()
             .init_resource::<prepare::SplatBatches>()
+            .init_resource::<prepare::StampBuffer>()
             .add_systems(RenderStartup, pass::init_splat_pipeline)
-            .add_systems(ExtractSchedule, prepare::extract_splats)
+            .add_systems(ExtractSchedule, (prepare::extract_splats, prepare::extract_stamps).chain())
             .add_systems(Render, prepare::prepare_splats.in_set(RenderSystems::PrepareBindGroups))
             // Materials sample the maps that this pass writes.
             .add_systems(RenderGraph, pass::paint_splats.before(camera_driver));

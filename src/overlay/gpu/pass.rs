@@ -33,7 +33,7 @@ pub(super) fn init_splat_pipeline(
         "weathering splats",
         &BindGroupLayoutEntries::sequential(
             ShaderStages::COMPUTE,
-            (uniform_buffer::<SurfaceBatch>(true), read_only(), read_only(), read_only()),
+            (uniform_buffer::<SurfaceBatch>(true), read_only(), read_only(), read_only(), read_only()),
         ),
     );
     let map = || texture_storage_2d(TextureFormat::Rgba8Unorm, StorageTextureAccess::ReadWrite);
@@ -41,7 +41,7 @@ pub(super) fn init_splat_pipeline(
         "weathering surface",
         &BindGroupLayoutEntries::sequential(
             ShaderStages::COMPUTE,
-            (map(), map(), map(), storage_buffer_sized(false, None)),
+            (map(), map(), map(), storage_buffer_sized(false, None), read_only()),
         ),
     );
     let shader = assets.load(

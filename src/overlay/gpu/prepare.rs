@@ -5,18 +5,19 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use bevy::ecs::entity::EntityHashMap;
 use bevy::prelude::*;
-use bevy::render::MainWorld;
 use bevy::render::render_asset::RenderAssets;
 use bevy::render::render_resource::{
-    BindGroup, BindGroupEntries, BufferUsages, DynamicUniformBuffer, PipelineCache, RawBufferVec, ShaderType,
+    BindGroup, BindGroupEntries, Buffer, BufferInitDescriptor, BufferUsages, DynamicUniformBuffer,
+    PipelineCache, RawBufferVec, ShaderType,
 };
 use bevy::render::renderer::{RenderDevice, RenderQueue};
 use bevy::render::storage::{GpuShaderBuffer, ShaderBuffer};
 use bevy::render::texture::GpuImage;
+use bevy::render::{Extract, MainWorld};
 
 use super::maps::Overlays;
 use super::pass::SplatPipeline;
-use crate::overlay::{Splat, SplatQueue, TileBins, TileHeader, Wrap};
+use crate::overlay::{Splat, SplatQueue, StampAtlas, SurfaceFrames, TexelFrame, TileBins, TileHeader, Wrap};
 
 /// What the pass needs to know about one surface. `SurfaceBatch` in `shaders/splat.wgsl` has the same fields.
 #[derive(ShaderType, Debug, Clone, Copy)]
@@ -73,6 +74,9 @@ pub(super) struct PendingSplats {
 struct PendingSurface {
     entity: Entity,
     maps: Maps,
+    /// Where the texels lie, and that on the GPU once the first splat in space comes.
+    frames: Option<SurfaceFrames>,
+    frame_buffer: Option<Buffer>,
     splats: Vec<Splat>,
 }
 
@@ -100,16 +104,27 @@ impl From<&Overlays> for Maps {
 pub(super) fn extract_splats(
     mut main_world: ResMut<MainWorld>,
     mut pending: ResMut<PendingSplats>,
-    mut query: Local<Option<QueryState<(Entity, &'static Overlays, &'static mut SplatQueue)>>>,
+    mut query: Local<
+        Option<
+            QueryState<(Entity, &'static Overlays, &'static mut SplatQueue, Option<&'static SurfaceFrames>)>,
+        >,
+    >,
 ) {
     let query = query.get_or_insert_with(|| main_world.query());
     let PendingSplats { surfaces, by_entity } = &mut *pending;
-    for (entity, overlays, mut queue) in query.iter_mut(&mut main_world) {
+    for (entity, overlays, mut queue, frames) in query.iter_mut(&mut main_world) {
         if queue.is_empty() {
             continue;
         }
         let index = *by_entity.entry(entity).or_insert_with(|| {
-            surfaces.push(PendingSurface { entity, maps: overlays.into(), splats: Vec::new() });
+            let maps = overlays.into();
+            surfaces.push(PendingSurface {
+                entity,
+                maps,
+                frames: None,
+                frame_buffer: None,
+                splats: Vec::new(),
+            });
             surfaces.len() - 1
         });
         let waiting = &mut surfaces[index];
@@ -118,6 +133,10 @@ pub(super) fn extract_splats(
             waiting.splats.clear();
         }
         waiting.maps = overlays.into();
+        let place = |frames: &SurfaceFrames| Arc::as_ptr(&frames.0);
+        if waiting.frames.as_ref().map(place) != frames.map(place) {
+            (waiting.frames, waiting.frame_buffer) = (frames.cloned(), None);
+        }
         queue.drain_into(&mut waiting.splats);
     }
     let gone = |waiting: &PendingSurface| main_world.get_entity(waiting.entity).is_err();
@@ -128,6 +147,33 @@ pub(super) fn extract_splats(
     }
 }
 
+/// The stamps on the GPU.
+#[derive(Resource, Default)]
+pub(super) struct StampBuffer {
+    atlas: StampAtlas,
+    buffer: Option<Buffer>,
+}
+
+/// Takes over what has been added to the atlas.
+pub(super) fn extract_stamps(atlas: Extract<Option<Res<StampAtlas>>>, mut stamps: ResMut<StampBuffer>) {
+    if let Some(atlas) = &*atlas
+        && atlas.len() != stamps.atlas.len()
+    {
+        *stamps = StampBuffer { atlas: StampAtlas::clone(atlas), buffer: None };
+    }
+}
+
+/// A buffer that is written once; `one` if there is nothing in it, since none can be empty.
+fn fixed_buffer<T: bytemuck::Pod + Default>(device: &RenderDevice, label: &str, rows: &[T]) -> Buffer {
+    let one = [T::default()];
+    let rows = if rows.is_empty() { &one } else { rows };
+    device.create_buffer_with_data(&BufferInitDescriptor {
+        label: Some(label),
+        contents: bytemuck::cast_slice(rows),
+        usage: BufferUsages::STORAGE,
+    })
+}
+
 /// What this frame's pass will do.
 #[derive(Resource)]
 pub(super) struct SplatBatches {
@@ -136,6 +182,8 @@ pub(super) struct SplatBatches {
     tiles: RawBufferVec<TileHeader>,
     list: RawBufferVec<u32>,
     bins: TileBins,
+    /// For surfaces on which nothing lies in space.
+    no_frames: Option<Buffer>,
     /// The buffers above.
     pub(super) frame: Option<BindGroup>,
     pub(super) jobs: Vec<Job>,
@@ -156,6 +204,7 @@ impl Default for SplatBatches {
             tiles: RawBufferVec::new(BufferUsages::STORAGE),
             list: RawBufferVec::new(BufferUsages::STORAGE),
             bins: TileBins::default(),
+            no_frames: None,
             frame: None,
             jobs: Vec::new(),
         }
@@ -166,6 +215,7 @@ impl Default for SplatBatches {
 pub(super) fn prepare_splats(
     mut pending: ResMut<PendingSplats>,
     mut batches: ResMut<SplatBatches>,
+    mut stamps: ResMut<StampBuffer>,
     stats: Res<SplatStats>,
     pipeline: Res<SplatPipeline>,
     cache: Res<PipelineCache>,
@@ -174,7 +224,7 @@ pub(super) fn prepare_splats(
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
 ) {
-    let SplatBatches { batches, splats, tiles, list, bins, frame, jobs } = &mut *batches;
+    let SplatBatches { batches, splats, tiles, list, bins, no_frames, frame, jobs } = &mut *batches;
     jobs.clear();
     if pending.surfaces.iter().all(|surface| surface.splats.is_empty())
         || cache.get_compute_pipeline(pipeline.pipeline).is_none()
@@ -194,7 +244,16 @@ pub(super) fn prepare_splats(
         };
         let first_tile = tiles.len() as u32;
         let first_splat = splats.len() as u32;
-        bins.bin(&waiting.splats, size, wrap, first_splat, tiles.values_mut(), list.values_mut());
+        let frames = waiting.frames.as_ref();
+        bins.bin(&waiting.splats, size, wrap, frames, first_splat, tiles.values_mut(), list.values_mut());
+        let in_space = waiting.splats.iter().any(|splat| splat.in_space != 0);
+        let frame_buffer = match (&mut waiting.frame_buffer, frames) {
+            (Some(buffer), _) => &*buffer,
+            (none, Some(frames)) if in_space => {
+                &*none.insert(fixed_buffer(&device, "weathering frames", frames.texels()))
+            }
+            _ => &*no_frames.get_or_insert_with(|| fixed_buffer::<TexelFrame>(&device, "no frames", &[])),
+        };
         splats.values_mut().extend_from_slice(&waiting.splats);
         let touched = tiles.len() as u32 - first_tile;
         let clamped = UVec2::from_array(wrap.map(|wrap| u32::from(wrap == Wrap::Clamp)));
@@ -207,6 +266,7 @@ pub(super) fn prepare_splats(
                     &specular.texture_view,
                     &normal.texture_view,
                     rings.buffer.as_entire_buffer_binding(),
+                    frame_buffer.as_entire_buffer_binding(),
                 )),
             ),
             batch_offset: batches.push(&SurfaceBatch { size, first_tile, clamped }),
@@ -224,10 +284,12 @@ pub(super) fn prepare_splats(
     else {
         return;
     };
+    let StampBuffer { atlas, buffer } = &mut *stamps;
+    let stamps = buffer.get_or_insert_with(|| fixed_buffer(&device, "weathering stamps", atlas.texels()));
     *frame = Some(device.create_bind_group(
         "weathering splats",
         &cache.get_bind_group_layout(&pipeline.frame_layout),
-        &BindGroupEntries::sequential((batches, splats, tiles, list)),
+        &BindGroupEntries::sequential((batches, splats, tiles, list, stamps.as_entire_buffer_binding())),
     ));
 }
 

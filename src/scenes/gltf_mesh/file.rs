@@ -116,7 +116,11 @@ impl<'a> GltfFile<'a> {
             }
             None => (0..positions.len() as u32).collect(),
         };
-        if shape.positions.len().max(shape.indices.len()) > MAX_ELEMENTS {
+        let more = match mode {
+            Mode::Triangles => corners.len(),
+            _ => 3 * corners.len().saturating_sub(2),
+        };
+        if (shape.positions.len() + positions.len()).max(shape.indices.len() + more) > MAX_ELEMENTS {
             return Err(format!("belongs to a mesh of more than {MAX_ELEMENTS} vertices or indices"));
         }
         let (first, count) = (shape.positions.len() as u32, positions.len() as u32);
@@ -160,8 +164,8 @@ impl<'a> GltfFile<'a> {
         self.elements(accessor, kind.size(), |bytes| whole(kind, bytes))
     }
 
-    /// The elements of an accessor, `size` bytes each, sparse or not.
-    fn elements<T: Clone>(
+    /// The elements of an accessor with a buffer view, `size` bytes each, sparse or not.
+    fn elements<T>(
         &self,
         accessor: &Accessor,
         size: usize,
@@ -171,13 +175,10 @@ impl<'a> GltfFile<'a> {
         if count > MAX_ELEMENTS {
             return Err(format!("has {count} elements; at most {MAX_ELEMENTS} are read"));
         }
-        let mut values = match accessor.view() {
-            Some(view) => self
-                .read(&view, accessor.offset(), size, count, &decode)
-                .ok_or("does not fit into its buffer view, or that not into its buffer")?,
-            // Zero everywhere but for what the sparse part says.
-            None => vec![decode(&vec![0u8; size]); count],
-        };
+        let view = accessor.view().ok_or("has no `bufferView`")?;
+        let mut values = self
+            .read(&view, accessor.offset(), size, count, &decode)
+            .ok_or("does not fit into its buffer view, or that not into its buffer")?;
         if let Some(sparse) = accessor.sparse() {
             let (indices, replacing) = (sparse.indices(), sparse.values());
             let kind = match indices.index_type() {

@@ -3,7 +3,8 @@
 //! The `gltf` crate parses and checks the JSON. Its readers of vertex data trust the file, though, and panic
 //! where an accessor says one thing and its buffer another, so numbers are fetched here: every offset, stride
 //! and count is held against the bytes that are there. Buffers are the binary chunk of a `.glb`, `data:`
-//! URIs, or files beside the glTF; what lies outside its folder is not read.
+//! URIs, or files beside the glTF; what lies outside its folder is not read. An accessor without a buffer view,
+//! zero but for a sparse part, is refused: a few bytes could ask for any amount of memory.
 //!
 //! What this does not do: skins and morph targets stay in their bind pose, compressed meshes are refused,
 //! materials are not looked at.
@@ -18,7 +19,7 @@ use std::path::{Path, PathBuf};
 use bevy::math::{Affine3A, Mat4};
 
 use self::file::GltfFile;
-pub(crate) use self::uri::percent_decoded;
+pub(crate) use self::uri::{data_uri, percent_decoded};
 use crate::collision::MeshTriangles;
 
 /// A mesh where it stands in its scene.
@@ -245,11 +246,26 @@ mod tests {
         assert_eq!(read_meshes(&path).unwrap()[0].triangles, triangles);
     }
 
+    /// Nothing but a sparse part is left of an accessor.
+    fn without_view(json: &mut serde_json::Value, accessor: usize) {
+        let accessor = &mut json["accessors"][accessor];
+        accessor.as_object_mut().unwrap().remove("bufferView");
+        accessor["sparse"] = serde_json::json!({
+            "count": 1,
+            "indices": { "bufferView": 1, "componentType": 5121 },
+            "values": { "bufferView": 0 },
+        });
+    }
+
     #[test]
     fn what_is_damaged_is_named_and_does_not_panic() {
         let folder = tempfile::tempdir().unwrap();
         type Edit = fn(&mut serde_json::Value);
-        let edits: [(Edit, &str); 11] = [
+        let edits: [(Edit, &str); 15] = [
+            (|json| without_view(json, 0), "`POSITION` that has no `bufferView`"),
+            (|json| without_view(json, 1), "`indices` whose accessor has no `bufferView`"),
+            (|json| without_view(json, 2), "`TEXCOORD_0` that has no `bufferView`"),
+            (|json| json["buffers"][0]["uri"] = "some%ffdata.bin".into(), "escapes"),
             (|json| json["buffers"][0]["uri"] = "../some data.bin".into(), "buffers[0].uri"),
             (|json| json["buffers"][0]["uri"] = "/etc/hostname".into(), "outside"),
             (|json| json["buffers"][0]["uri"] = "gone.bin".into(), "gone.bin"),

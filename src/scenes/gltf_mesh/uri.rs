@@ -1,6 +1,10 @@
 //! What the URIs of a glTF stand for.
 
+use std::borrow::Cow;
 use std::path::{Component, Path};
+
+use base64::prelude::{BASE64_STANDARD, Engine};
+use percent_encoding::percent_decode_str;
 
 use super::{GltfMeshError, MAX_FILE_BYTES};
 
@@ -15,15 +19,20 @@ pub(super) fn read_capped(path: &Path) -> Result<Vec<u8>, GltfMeshError> {
 
 /// The bytes that a URI stands for.
 pub(super) fn read_uri(path: &Path, field: &str, uri: &str) -> Result<Vec<u8>, GltfMeshError> {
-    if let Some(data) = uri.strip_prefix("data:") {
-        let bytes = data.split_once(";base64,").and_then(|(_, encoded)| base64_decoded(encoded));
-        let reason = "has a `data:` URI that is not base64".into();
-        return bytes.ok_or(GltfMeshError::Content { path: path.into(), field: field.into(), reason });
+    let content = |reason: &str| GltfMeshError::Content {
+        path: path.into(),
+        field: field.into(),
+        reason: reason.into(),
+    };
+    let decoded =
+        percent_decoded(uri).ok_or_else(|| content("has a `uri` whose escapes stand for no text"))?;
+    if let Some((kind, data)) = data_uri(&decoded) {
+        let bytes = kind.ends_with(";base64").then(|| BASE64_STANDARD.decode(data).ok()).flatten();
+        return bytes.ok_or_else(|| content("has a `data:` URI that is not base64"));
     }
     let outside =
         || GltfMeshError::Outside { path: path.into(), field: format!("{field}.uri"), uri: uri.into() };
-    let decoded = percent_decoded(uri).ok_or_else(outside)?;
-    let relative = Path::new(&decoded);
+    let relative = Path::new(&*decoded);
     let plain = |part: Component| matches!(part, Component::Normal(_) | Component::CurDir);
     if decoded.is_empty() || !relative.components().all(plain) {
         return Err(outside());
@@ -38,43 +47,14 @@ pub(super) fn read_uri(path: &Path, field: &str, uri: &str) -> Result<Vec<u8>, G
 }
 
 /// A URI without its `%XX`; `None` if what they stand for is no text.
-pub(crate) fn percent_decoded(uri: &str) -> Option<String> {
-    let mut bytes = Vec::new();
-    let mut rest = uri.as_bytes();
-    while let [first, tail @ ..] = rest {
-        let hex = (*first == b'%').then(|| std::str::from_utf8(tail.get(..2)?).ok()).flatten();
-        if let Some(byte) = hex.and_then(|hex| u8::from_str_radix(hex, 16).ok()) {
-            bytes.push(byte);
-            rest = &tail[2..];
-        } else {
-            bytes.push(*first);
-            rest = tail;
-        }
-    }
-    String::from_utf8(bytes).ok()
+pub(crate) fn percent_decoded(uri: &str) -> Option<Cow<'_, str>> {
+    percent_decode_str(uri).decode_utf8().ok()
 }
 
-/// RFC 4648, with or without padding; `None` if a letter is none of its.
-fn base64_decoded(text: &str) -> Option<Vec<u8>> {
-    let mut bytes = Vec::with_capacity(text.len() / 4 * 3);
-    let (mut bits, mut count) = (0u32, 0u32);
-    for letter in text.trim_end_matches('=').bytes() {
-        let value = match letter {
-            b'A'..=b'Z' => letter - b'A',
-            b'a'..=b'z' => letter - b'a' + 26,
-            b'0'..=b'9' => letter - b'0' + 52,
-            b'+' => 62,
-            b'/' => 63,
-            _ => return None,
-        };
-        bits = (bits << 6) | u32::from(value);
-        count += 6;
-        if count >= 8 {
-            count -= 8;
-            bytes.push((bits >> count) as u8);
-        }
-    }
-    Some(bytes)
+/// Kind and content of a decoded `data:` URI. `None` for anything that Bevy would take for a path: also one without a
+/// comma.
+pub(crate) fn data_uri(decoded: &str) -> Option<(&str, &str)> {
+    decoded.strip_prefix("data:")?.split_once(',')
 }
 
 #[cfg(test)]
@@ -82,13 +62,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn base64_and_escapes_are_decoded() {
-        let cases: [(&str, &[u8]); 5] =
-            [("", b""), ("Zg==", b"f"), ("Zm8=", b"fo"), ("Zm9v", b"foo"), ("+/8", b"\xfb\xff")];
-        for (text, bytes) in cases {
-            assert_eq!(base64_decoded(text).as_deref(), Some(bytes), "{text}");
+    fn escapes_are_seen_through() {
+        assert_eq!(percent_decoded("a%20b%2e%2E%2Fc").as_deref(), Some("a b../c"));
+        assert_eq!(percent_decoded("100%+1%2").as_deref(), Some("100%+1%2"));
+        assert_eq!(percent_decoded("%ff"), None);
+    }
+
+    #[test]
+    fn data_is_told_from_paths_after_its_escapes_are_decoded() {
+        let path = Path::new("scene.gltf");
+        for uri in ["data:x;base64,Zm8=", "data%3Ax%3Bbase64%2CZm8%3D", "data:;base64,Zm8="] {
+            assert_eq!(read_uri(path, "buffers[0]", uri).unwrap(), b"fo", "{uri}");
         }
-        assert_eq!(base64_decoded("Zm9v!"), None);
-        assert_eq!(percent_decoded("a%20b%2Fc%").as_deref(), Some("a b/c%"));
+        let error = |uri| read_uri(path, "buffers[0]", uri).unwrap_err().to_string();
+        for uri in ["data:x;base64,Zm8", "data:x;base64,Zm9v!", "data:x,Zm9v"] {
+            assert!(
+                error(uri).contains("`buffers[0]`") && error(uri).contains("not base64"),
+                "{}",
+                error(uri)
+            );
+        }
+        assert!(error("a%ff.bin").contains("escapes"), "{}", error("a%ff.bin"));
+        assert!(error("data:/../../a.bin").contains("outside"), "{}", error("data:/../../a.bin"));
     }
 }

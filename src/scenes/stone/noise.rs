@@ -1,7 +1,9 @@
 //! The ingredients of a recipe: noise, grains, spots and scratches, all of which repeat over the tile.
 
 use bevy::math::{IVec2, Vec2};
-use fastnoise_lite::{FastNoiseLite, FractalType};
+use fastnoise_lite::NoiseType;
+
+pub(super) use crate::scenes::noise::{Noise, hash, smoothstep, unit};
 
 /// Makes the ingredients of a recipe, each with its own random numbers.
 #[derive(Clone, Copy)]
@@ -16,11 +18,8 @@ pub(super) struct Layers {
 impl Layers {
     /// Noise with `cycles` features per tile along u and v and `octaves` finer ones.
     pub(super) fn noise(self, layer: u32, cycles: Vec2, octaves: i32) -> Noise {
-        let mut source = FastNoiseLite::with_seed(hash([self.seed, layer, 0]) as i32);
-        source.set_frequency(Some(1.0));
-        source.set_fractal_type(Some(FractalType::FBm));
-        source.set_fractal_octaves(Some(octaves));
-        Noise { source, cycles: cycles.min(Vec2::splat(self.finest)) }
+        let cycles = cycles.min(Vec2::splat(self.finest));
+        Noise::new(NoiseType::OpenSimplex2, hash([self.seed, layer, 0]), cycles, octaves)
     }
 
     /// `per_side * per_side` cells per tile.
@@ -42,35 +41,6 @@ impl Layers {
             }
         };
         Scratches((0..count).map(scratch).collect())
-    }
-}
-
-/// Fractal noise that repeats over the unit square, about -1 to 1; see [`super`] on tiling.
-/// Half a cycle per tile is the least: closer, noise resembles itself and gains contrast when exchanged.
-pub(super) struct Noise {
-    source: FastNoiseLite,
-    cycles: Vec2,
-}
-
-impl Noise {
-    pub(super) fn at(&self, uv: Vec2) -> f32 {
-        let uv = uv - uv.floor();
-        let late = Vec2::new(smoothstep(0.75, 1.0, uv.x), smoothstep(0.75, 1.0, uv.y));
-        let early = 1.0 - late;
-        let mut sum = 0.0;
-        for (shift, weight) in [
-            (Vec2::ZERO, early.x * early.y),
-            (Vec2::X, late.x * early.y),
-            (Vec2::Y, early.x * late.y),
-            (Vec2::ONE, late.x * late.y),
-        ] {
-            if weight > 0.0 {
-                let at = (uv - shift) * self.cycles;
-                sum += weight * self.source.get_noise_2d(at.x, at.y);
-            }
-        }
-        let variance = early * early + late * late;
-        sum / (variance.x * variance.y).sqrt()
     }
 }
 
@@ -181,46 +151,5 @@ impl Scratches {
             scratch.strength * (1.0 - across).max(0.0) * (1.0 - along * along).max(0.0)
         };
         self.0.iter().map(depth).fold(0.0, f32::max)
-    }
-}
-
-pub(super) fn smoothstep(low: f32, high: f32, value: f32) -> f32 {
-    let t = ((value - low) / (high - low)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
-}
-
-/// Three numbers stirred into one: the finaliser of MurmurHash3 after each.
-pub(super) fn hash(numbers: [u32; 3]) -> u32 {
-    numbers.into_iter().fold(0x9e37_79b9, |hash, number| {
-        let mut h = hash ^ number.wrapping_mul(0xcc9e_2d51);
-        h = (h ^ (h >> 16)).wrapping_mul(0x85eb_ca6b);
-        h = (h ^ (h >> 13)).wrapping_mul(0xc2b2_ae35);
-        h ^ (h >> 16)
-    })
-}
-
-/// A hash as a number from 0 up to, but not including, 1.
-pub(super) fn unit(hash: u32) -> f32 {
-    (hash >> 8) as f32 / 16_777_216.0
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_exchange_of_noises_keeps_their_contrast() {
-        for cycles in [Vec2::splat(9.0), Vec2::new(0.5, 22.0)] {
-            // The spread at one u over many seeds and v.
-            let spread = |u: f32| {
-                let values = (0..150).flat_map(|seed| {
-                    let noise = Layers { seed, finest: 100.0, tile_mm: 400.0 }.noise(1, cycles, 2);
-                    (0..40).map(move |i| noise.at(Vec2::new(u, i as f32 / 60.0)))
-                });
-                values.map(|value| value * value).sum::<f32>().sqrt()
-            };
-            let ratio = spread(0.875) / spread(0.3);
-            assert!((ratio - 1.0).abs() < 0.1, "{cycles}: {ratio}");
-        }
     }
 }

@@ -1,0 +1,63 @@
+//! Dust, mud and snow on surfaces, and what water, slopes and warmth do to them.
+//!
+//! Each texel holds three amounts beside its water ([`TexelMatter`]), in the same whole units. Impacts leave [`Deposit`]s,
+//! shared out under their stamps as water is (`settle`). From then on:
+//!
+//! - water takes soil along: drops loosen it, films carry what is loose, drips take it off the surface, and a film that dries
+//!   up leaves a crust ([`wash`]);
+//! - snow lies where it is cold ([`snow`]), slides where it is steep, and piles up below ([`slide`]);
+//! - what melts is water on the same texel, to the unit.
+//!
+//! Only tiles that have something to do take steps: those where snow may slide and, in a thaw, those where it lies. Dust and
+//! mud at rest cost nothing, in any weather. What came is on the surface or in the [`MatterLedger`], exactly.
+//!
+//! In the tick, where the water is; what is drawn goes with the water's tiles ([`look`]).
+//!
+//! Not here: wind that lifts dust or drifts snow; ice; layers, so that snow is drawn over soil, whichever came first.
+
+mod advance;
+pub mod look;
+mod settle;
+pub mod slide;
+pub mod snow;
+mod surface;
+#[cfg(test)]
+mod test_world;
+mod texel;
+pub mod wash;
+
+use bevy::prelude::*;
+
+use crate::overlay::Weatherable;
+
+pub use look::{GpuTexelMatter, MatterLook, pack_matter};
+pub use settle::Deposit;
+pub use slide::SnowFall;
+pub use surface::{MatterLedger, MatterStock, SurfaceMatter};
+pub use texel::{MatterKind, TexelMatter};
+
+pub(crate) use advance::{MatterScratch, advance_matter, is_at_rest};
+pub(crate) use settle::deposit;
+pub(crate) use surface::MatterTiles;
+
+/// Matter that waits to be put on one surface, in the order of its impacts.
+#[derive(Component, Debug, Default)]
+pub struct MatterQueue(pub Vec<Deposit>);
+
+/// Snow that fell off one surface in this tick.
+#[derive(Component, Debug, Default)]
+pub struct FallingSnow(pub Vec<SnowFall>);
+
+/// Gives surfaces room for matter. What moves it is part of the tick of [`WettingPlugin`](crate::wetting::WettingPlugin),
+/// which needs it.
+pub struct MatterPlugin;
+
+impl Plugin for MatterPlugin {
+    fn build(&self, app: &mut App) {
+        app.register_required_components::<Weatherable, SurfaceMatter>()
+            .register_required_components::<Weatherable, MatterQueue>()
+            .register_required_components::<Weatherable, FallingSnow>()
+            .register_type::<MatterLook>()
+            .init_resource::<MatterLook>();
+    }
+}

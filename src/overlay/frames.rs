@@ -1,0 +1,263 @@
+//! Where the texels of a map lie in the space of their mesh: what stamps need to cross from one island of the map to the next.
+
+use std::sync::Arc;
+
+use bevy::ecs::entity::EntityHashMap;
+use bevy::math::Affine3A;
+use bevy::prelude::*;
+use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+use bytemuck::{Pod, Zeroable};
+
+use super::kernel::{cross_axes, unpack_axis};
+use super::{StampSpace, TILE_SIZE, Weatherable, Wrap};
+use crate::collision::{BoxOverlaps, DeformingCollider, MeshTriangles, SurfaceCollider};
+use crate::effect::{EffectTable, WeatherEffect};
+use crate::wetting::{TexelGeometry, WetGeometry, surface_points};
+
+/// A texel's place, in whole numbers. A row of the GPU's frame buffer: `TexelFrame` in `shaders/splat.wgsl` has the same
+/// fields. Zero where nothing lies.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
+pub struct TexelFrame {
+    /// x, and y above it; 16 bits each, in steps.
+    pub xy: u32,
+    /// z, 16 bits; above it 1 if something lies here, and 2 if v grows along `along_u` x `normal`, not against it.
+    pub z: u32,
+    /// Unit normal of the front; signed bytes, 127 for 1.
+    pub normal: u32,
+    /// The direction in which u grows, likewise. That of v stands upright on both.
+    pub along_u: u32,
+}
+
+impl TexelFrame {
+    const LIES: u32 = 1 << 16;
+    const FLIPPED: u32 = 2 << 16;
+
+    fn new(at: [i32; 3], normal: Vec3, along_u: Vec3, along_v: Vec3) -> Self {
+        let [x, y, z] = at.map(|along| along.clamp(0, 0xffff) as u32);
+        Self {
+            xy: x | y << 16,
+            z: z | Self::LIES | if normal.cross(along_u).dot(along_v) < 0.0 { Self::FLIPPED } else { 0 },
+            normal: pack_axis(normal),
+            along_u: pack_axis(along_u),
+        }
+    }
+
+    /// The directions in which u and v grow, 127 for 1.
+    pub(super) fn along(&self) -> [[i32; 3]; 2] {
+        let (normal, along_u) = (unpack_axis(self.normal), unpack_axis(self.along_u));
+        let along_v = cross_axes(normal, along_u);
+        [along_u, if self.z & Self::FLIPPED == 0 { along_v } else { along_v.map(|part| -part) }]
+    }
+
+    /// Its place in steps; none where nothing lies.
+    pub fn place(&self) -> Option<[i32; 3]> {
+        let low = |word: u32| (word & 0xffff) as i32;
+        (self.z & Self::LIES != 0).then_some([low(self.xy), low(self.xy >> 16), low(self.z)])
+    }
+}
+
+/// Three signed bytes, 127 for 1.
+pub(super) fn pack_axis(axis: Vec3) -> u32 {
+    let [x, y, z] = (axis * 127.0).round().to_array().map(|part| part as i8 as u8);
+    u32::from_le_bytes([x, y, z, 0])
+}
+
+/// The places of all texels of a surface, in the space of its mesh at rest. Comes with the surface's geometry.
+#[derive(Component, Clone)]
+pub struct SurfaceFrames(pub(crate) Arc<Frames>, Arc<TexelGeometry>);
+
+impl SurfaceFrames {
+    /// Measures a mesh for a map of `size` x `size` texels.
+    pub fn new(triangles: &MeshTriangles, size: u32, wrap: [Wrap; 2]) -> Self {
+        let geometry = TexelGeometry::new(triangles, &Affine3A::IDENTITY, Vec3::Y, size, wrap);
+        Self(Arc::new(Frames::new(triangles, &geometry, wrap)), Arc::new(geometry))
+    }
+
+    /// The texels, row by row.
+    pub fn texels(&self) -> &[TexelFrame] {
+        &self.0.texels
+    }
+}
+
+/// What [`SurfaceFrames`] holds.
+pub(crate) struct Frames {
+    /// Row by row, with a gutter of two texels.
+    pub(crate) texels: Vec<TexelFrame>,
+    low: Vec3,
+    /// Length of a step, in units of the mesh.
+    step: f32,
+    /// Boxes around what lies on each tile, in steps, and which tile it is.
+    boxes: BoxOverlaps,
+    tiles: Vec<u32>,
+}
+
+impl Frames {
+    /// Measures a mesh. `geometry` of the same mesh, size and edges; it knows the gutter.
+    pub(crate) fn new(triangles: &MeshTriangles, geometry: &TexelGeometry, wrap: [Wrap; 2]) -> Self {
+        let size = geometry.size();
+        let all = triangles.positions.iter().flatten();
+        let (low, high) =
+            all.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &at| (low.min(at), high.max(at)));
+        let extent = (high - low).max_element();
+        let step = if extent.is_finite() && extent > 0.0 { extent / 65_535.0 } else { 1.0 };
+        let directions: Vec<[Vec3; 2]> =
+            (0..triangles.positions.len()).map(|index| directions(triangles, index)).collect();
+        let mut texels = vec![TexelFrame::default(); (size * size) as usize];
+        for point in surface_points(triangles, &Affine3A::IDENTITY, size, wrap) {
+            let at = ((point.position - low) / step).round().as_ivec3().to_array();
+            let [along_u, along_v] = directions[point.triangle as usize];
+            texels[point.texel as usize] = TexelFrame::new(at, point.normal, along_u, along_v);
+        }
+        for texel in 0..size * size {
+            if let Some(source) = geometry.gutter_source(texel) {
+                texels[texel as usize] = texels[source as usize];
+            }
+        }
+        let (tiles, boxes) = tile_boxes(&texels, size);
+        Self { texels, low, step, boxes: BoxOverlaps::build(&boxes), tiles }
+    }
+
+    /// A point of the mesh, in steps.
+    pub(crate) fn steps(&self, point: Vec3) -> [i32; 3] {
+        ((point - self.low) / self.step).round().as_ivec3().to_array()
+    }
+
+    /// Length of a step, in units of the mesh.
+    pub(crate) fn step(&self) -> f32 {
+        self.step
+    }
+
+    /// Calls `touch` for each tile that may hold something within `reach` steps of a place, each once, in no order.
+    pub(crate) fn tiles_near(&self, origin: [i32; 3], reach: i32, mut touch: impl FnMut(u32)) {
+        let (middle, reach) = (IVec3::from_array(origin).as_vec3(), reach as f32 + 1.0);
+        self.boxes.visit((middle - reach, middle + reach), |index| touch(self.tiles[index as usize]));
+    }
+}
+
+/// Unit directions in which u and v grow on a triangle; zero where they do not.
+fn directions(triangles: &MeshTriangles, index: usize) -> [Vec3; 2] {
+    let ([a, b, c], [uv_a, uv_b, uv_c]) = (triangles.positions[index], triangles.uvs[index]);
+    let ((ab, ac), (uv_ab, uv_ac)) = ((b - a, c - a), (uv_b - uv_a, uv_c - uv_a));
+    let facing = uv_ab.perp_dot(uv_ac).signum();
+    let along_u = (ab * uv_ac.y - ac * uv_ab.y) * facing;
+    let along_v = (ac * uv_ab.x - ab * uv_ac.x) * facing;
+    [along_u.normalize_or_zero(), along_v.normalize_or_zero()]
+}
+
+/// The tiles on which anything lies, and boxes around that.
+fn tile_boxes(texels: &[TexelFrame], size: u32) -> (Vec<u32>, Vec<(Vec3, Vec3)>) {
+    let across = size / TILE_SIZE;
+    let empty = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    let mut boxes = vec![empty; (across * across) as usize];
+    for (texel, frame) in (0u32..).zip(texels) {
+        let Some(place) = frame.place() else { continue };
+        let at = IVec3::from_array(place).as_vec3();
+        let tile = texel / size / TILE_SIZE * across + texel % size / TILE_SIZE;
+        let (low, high) = &mut boxes[tile as usize];
+        (*low, *high) = (low.min(at), high.max(at));
+    }
+    (0u32..).zip(boxes).filter(|(_, (low, _))| low.is_finite()).unzip()
+}
+
+/// What is being measured.
+#[derive(Resource, Default)]
+pub(crate) struct FramesWork {
+    tasks: EntityHashMap<(Arc<TexelGeometry>, Task<Frames>)>,
+}
+
+type Measurable = (
+    Entity,
+    &'static Weatherable,
+    &'static WetGeometry,
+    &'static SurfaceCollider,
+    Option<&'static SurfaceFrames>,
+    Has<DeformingCollider>,
+);
+
+impl FramesWork {
+    /// Whether surfaces are being measured.
+    pub(crate) fn is_busy(&self) -> bool {
+        !self.tasks.is_empty()
+    }
+}
+
+/// Measures the surfaces that are stamped on where they are, once there is an effect that paints.
+pub(super) fn measure_frames(
+    mut commands: Commands,
+    effects: Res<EffectTable>,
+    mut work: ResMut<FramesWork>,
+    surfaces: Query<Measurable>,
+) {
+    let work = work.bypass_change_detection();
+    work.tasks.retain(|entity, (geometry, task)| {
+        let Some(frames) = check_ready(task) else { return true };
+        // What was another shape in the meantime is measured again.
+        if surfaces.get(*entity).is_ok_and(|(_, _, current, ..)| Arc::ptr_eq(&current.0, geometry)) {
+            let measured = SurfaceFrames(Arc::new(frames), geometry.clone());
+            commands.entity(*entity).insert(measured);
+        }
+        false
+    });
+    let paints = effects.rows().iter().filter_map(|row| row.effect.as_ref()).any(WeatherEffect::paints);
+    if !paints {
+        return;
+    }
+    for (entity, surface, geometry, collider, frames, deforms) in &surfaces {
+        let measured = frames.is_some_and(|frames| Arc::ptr_eq(&frames.1, &geometry.0));
+        let wanted = surface.stamps == StampSpace::Surface && !deforms;
+        if !wanted || measured || work.tasks.contains_key(&entity) {
+            continue;
+        }
+        let (bvh, wrap) = (collider.0.clone(), surface.wrap());
+        let of = geometry.0.clone();
+        let task = AsyncComputeTaskPool::get().spawn(async move { Frames::new(bvh.triangles(), &of, wrap) });
+        work.tasks.insert(entity, (geometry.0.clone(), task));
+    }
+}
+
+/// A surface that is not [`Weatherable`] any more has no marks any more.
+pub(super) fn release_frames(removed: On<Remove, Weatherable>, mut commands: Commands) {
+    commands.entity(removed.entity).try_remove::<SurfaceFrames>();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frames(mesh: Mesh, size: u32) -> Frames {
+        let triangles = MeshTriangles::from_mesh(&mesh).unwrap();
+        let wrap = [Wrap::Clamp; 2];
+        let geometry = TexelGeometry::new(&triangles, &Affine3A::IDENTITY, Vec3::Y, size, wrap);
+        Frames::new(&triangles, &geometry, wrap)
+    }
+
+    #[test]
+    fn texels_of_a_plane_lie_where_they_are() {
+        // u along x, v along z, 2 m wide.
+        let frames = frames(Plane3d::new(Vec3::Y, Vec2::ONE).into(), 32);
+        for texel in [0u32, 5, 31, 32 * 31, 32 * 17 + 9] {
+            let frame = frames.texels[texel as usize];
+            let [x, y, z] = frame.place().unwrap();
+            let expected = |at: u32| ((at as f32 + 0.5) / 32.0 * 65_535.0).round() as i32;
+            assert_eq!((x, y, z), (expected(texel % 32), 0, expected(texel / 32)));
+            assert_eq!(frame.normal, pack_axis(Vec3::Y));
+            assert_eq!(frame.along(), [[127, 0, 0], [0, 0, 127]]);
+        }
+    }
+
+    #[test]
+    fn tiles_within_reach_are_found_and_far_ones_are_not() {
+        let frames = frames(Plane3d::new(Vec3::Y, Vec2::ONE).into(), 64);
+        let near = |point: Vec3, reach: i32| {
+            let mut tiles = Vec::new();
+            frames.tiles_near(frames.steps(point), reach, |tile| tiles.push(tile));
+            tiles.sort_unstable();
+            tiles
+        };
+        assert_eq!(near(Vec3::new(-0.9, 0.0, -0.9), 1000), [0]);
+        assert_eq!(near(Vec3::new(-0.5, 0.0, -0.9), 2000), [0, 1]);
+        assert_eq!(near(Vec3::ZERO, 66_000).len(), 16);
+        assert!(near(Vec3::Y * 0.5, 2000).is_empty());
+    }
+}

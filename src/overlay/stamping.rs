@@ -1,0 +1,249 @@
+//! The stamp an impact leaves: as large in metres as its effect says, wherever the uvs are wide or narrow.
+
+use bevy::math::{Affine3A, Vec3A};
+use bevy::prelude::*;
+use bytemuck::Zeroable;
+
+use super::frames::{Frames, pack_axis};
+use super::splat::pack_unorm;
+use super::{Splat, Weatherable};
+use crate::collision::Impact;
+use crate::effect::drops::{drop_mm3, spread_mm};
+use crate::effect::{EffectRow, StampTurn, WeatherEffect};
+
+/// A surface that is stamped on where it is, not on its map.
+pub(super) struct Site<'a> {
+    pub(super) frames: &'a Frames,
+    pub(super) world_from_mesh: Affine3A,
+}
+
+/// Radius of the mark of an impact, metres, before it is drawn out.
+fn radius(impact: &Impact, effect: &WeatherEffect, row: &EffectRow) -> f32 {
+    let own = effect.stamp_radius.unwrap_or_else(|| {
+        let diameter = row.diameters_mm[usize::from(impact.class)];
+        let drops = (impact.volume_nl as f32 * 1e-3 / drop_mm3(diameter)).max(1.0);
+        let speed = impact.velocity.dot(impact.normal).abs();
+        0.5e-3 * spread_mm(diameter, speed) * drops.sqrt()
+    });
+    own * (1.0 + effect.stamp_radius_jitter * signed_hash(impact.sequence.0))
+}
+
+/// Axes of a stamp on a surface: the first two lie in it, the third is the normal of its front.
+struct Axes {
+    s: Vec3,
+    t: Vec3,
+    n: Vec3,
+}
+
+impl Axes {
+    fn new(impact: &Impact, turn: StampTurn, front: Vec3) -> Self {
+        // What comes straight down has no direction on the surface, but for rounding.
+        let along = |direction: Vec3| {
+            let flat = direction.reject_from(front);
+            (flat.length() > 1e-3 * direction.length()).then(|| flat.normalize())
+        };
+        let any = || front.any_orthonormal_vector();
+        let t = match turn {
+            StampTurn::Random => {
+                let (sin, cos) = (std::f32::consts::PI * signed_hash(!impact.sequence.0)).sin_cos();
+                let first = along(impact.along[0]).unwrap_or_else(any);
+                first * cos + front.cross(first) * sin
+            }
+            StampTurn::Flight => along(impact.velocity).unwrap_or_else(any),
+            StampTurn::Downhill => along(Vec3::NEG_Y).or_else(|| along(impact.velocity)).unwrap_or_else(any),
+        };
+        Self { s: t.cross(front), t, n: front }
+    }
+}
+
+/// The stamp of an impact.
+pub(super) fn splat_from_impact(
+    impact: &Impact,
+    row: &EffectRow,
+    effect: &WeatherEffect,
+    surface: &Weatherable,
+    site: Option<&Site>,
+    tick: u32,
+) -> Splat {
+    let size = surface.texels();
+    let own = radius(impact, effect, row);
+    // What flies in aslant is drawn out along its flight.
+    let steepness = impact.velocity.normalize_or_zero().dot(impact.normal).abs();
+    let stretch = (1.0 / steepness.max(0.05)).min(1.0 + effect.stamp_stretch);
+    let long = own * stretch;
+    let [r, g, b] = effect.diffuse.color;
+    let [reflectance, smoothness, unused] = effect.specular.color;
+    let (first, count) = row.stamps;
+    let stamp = if count == 0 { 0 } else { first + hash(impact.sequence.0 ^ 0x5bd1_e995) % count };
+    let mut splat = Splat {
+        center: Splat::center_from_uv(impact.uv, size, surface.wrap()),
+        radius: Splat::radius_from_uv(impact.uv_per_metre * long, size),
+        water_nl: impact.volume_nl,
+        tick,
+        diffuse: pack_unorm([r, g, b, effect.diffuse.opacity]),
+        specular: pack_unorm([reflectance, smoothness, unused, effect.specular.opacity]),
+        bump: (effect.bump * 127.0).round() as i32,
+        bump_opacity: if effect.bump == 0.0 { 0 } else { 255 },
+        stamp,
+        ..Zeroable::zeroed()
+    };
+    // The side of the triangle that was hit may be its back; the map lies on its front.
+    let front = impact.normal * impact.along[0].cross(impact.along[1]).dot(impact.normal).signum();
+    let axes = Axes::new(impact, effect.stamp_turn, front);
+    let flight = impact.velocity.reject_from(front).normalize_or_zero();
+    // Across the flight it is narrower than along it.
+    let drawn_out = |axis: Vec3| {
+        let along = flight * axis.dot(flight);
+        along + (axis - along) * stretch
+    };
+    let (s, t) = (drawn_out(axes.s), drawn_out(axes.t));
+    match site {
+        Some(site) if effect.paints() => {
+            // Never so small that it falls between texels.
+            let pitch = 1.0 / (impact.uv_per_metre.min_element() * size as f32).max(1e-6);
+            lay_in_space(&mut splat, site, impact.point, [s, t, axes.n], &axes, long.max(0.75 * pitch));
+        }
+        _ => {
+            let [u, v] = impact.along;
+            let on_map =
+                |axis: Vec3| [axis.dot(u), axis.dot(v), 0.0].map(|part| (part * 1024.0).round() as i32);
+            (splat.row_s, splat.row_t) = (on_map(s), on_map(t));
+        }
+    }
+    splat
+}
+
+/// Puts a stamp of this radius, metres, where it is on the surface. `rows`: its axes, drawn out; all in world space.
+fn lay_in_space(splat: &mut Splat, site: &Site, point: Vec3, rows: [Vec3; 3], axes: &Axes, radius: f32) {
+    let (frames, matrix) = (site.frames, site.world_from_mesh.matrix3);
+    let step = frames.step();
+    // From steps of the mesh to 1/256 radius.
+    let scale = f64::from(step) * 256.0 / f64::from(radius) * 65_536.0;
+    let in_mesh = |axis: Vec3| Vec3::from(matrix.transpose() * Vec3A::from(axis));
+    let row = |axis: Vec3| in_mesh(axis).to_array().map(|part| (f64::from(part) * scale).round() as i32);
+    [splat.row_s, splat.row_t, splat.row_n] = rows.map(row);
+    let metres_per_step = step * matrix.determinant().abs().cbrt();
+    splat.origin = frames.steps(site.world_from_mesh.inverse().transform_point3(point));
+    splat.reach = (2.0 * radius / metres_per_step.max(1e-12)).ceil().clamp(2.0, 131_070.0) as i32;
+    let axis = |axis: Vec3| pack_axis(in_mesh(axis).normalize_or_zero());
+    (splat.axis_s, splat.axis_t, splat.axis_n) = (axis(axes.s), axis(axes.t), axis(axes.n));
+    splat.in_space = 1;
+}
+
+/// The output permutation of PCG (O'Neill 2014) as a hash.
+fn hash(number: u32) -> u32 {
+    let state = number.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
+    (word >> 22) ^ word
+}
+
+/// An even number in [-1, 1).
+fn signed_hash(number: u32) -> f32 {
+    hash(number) as f32 / (1u32 << 31) as f32 - 1.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::collision::MeshTriangles;
+    use crate::effect::{EffectIndex, EffectTable};
+    use crate::overlay::Wrap;
+    use crate::particle::Sequence;
+    use crate::wetting::TexelGeometry;
+
+    fn impact(velocity: Vec3) -> Impact {
+        Impact {
+            sequence: Sequence(5),
+            surface: Entity::PLACEHOLDER,
+            triangle: 0,
+            point: Vec3::new(0.5, 0.0, -0.25),
+            normal: Vec3::Y,
+            uv: Vec2::new(0.75, 0.375),
+            uv_per_metre: Vec2::splat(0.5),
+            along: [Vec3::X, Vec3::Z],
+            velocity,
+            effect: EffectIndex(0),
+            class: 0,
+            volume_nl: 4189,
+        }
+    }
+
+    fn splat(impact: &Impact, effect: WeatherEffect, site: Option<&Site>) -> Splat {
+        let mut table = EffectTable::default();
+        table.insert(Handle::default(), effect);
+        let row = &table.rows()[0];
+        let surface = Weatherable { map_size: 64, wrap_u: Wrap::Clamp, wrap_v: Wrap::Clamp, ..default() };
+        splat_from_impact(impact, row, row.effect.as_ref().unwrap(), &surface, site, 1)
+    }
+
+    fn paint(stamp_radius: f32) -> WeatherEffect {
+        let diffuse = crate::effect::Paint { opacity: 1.0, ..default() };
+        WeatherEffect { stamp_radius: Some(stamp_radius), diffuse, ..default() }
+    }
+
+    #[test]
+    fn marks_are_as_large_as_the_effect_says_or_as_its_drops_spread() {
+        let straight = impact(Vec3::NEG_Y * 6.55);
+        assert_eq!(splat(&straight, paint(0.25), None).radius, [8 * 256; 2]);
+        // A drop of 2 mm spreads to 11.8 mm: too small for these texels of 31 mm. Ten thousand of them are not.
+        let drops = WeatherEffect { stamp_radius: None, ..paint(1.0) };
+        assert_eq!(splat(&straight, drops.clone(), None).radius, [Splat::MIN_RADIUS; 2]);
+        let many = Impact { volume_nl: 4189 * 10_000, ..straight };
+        let radius = splat(&many, drops, None).radius[0] as f32 / 256.0 / 32.0;
+        assert!((0.5..0.65).contains(&radius), "{radius} m");
+    }
+
+    #[test]
+    fn what_flies_in_aslant_is_drawn_out_along_its_flight() {
+        let aslant = impact(Vec3::new(3.0, -1.0, 0.0));
+        let effect = WeatherEffect { stamp_stretch: 1.0, stamp_turn: StampTurn::Flight, ..paint(0.25) };
+        let long = splat(&aslant, effect, None);
+        // Twice as long, and across that as wide as before: its v axis lies along +x, its u axis across.
+        assert_eq!(long.radius, [16 * 256; 2]);
+        assert_eq!(long.row_t, [1024, 0, 0]);
+        assert_eq!((long.row_s[0], long.row_s[1].abs()), (0, 2048));
+    }
+
+    #[test]
+    fn in_space_the_same_point_of_the_stamp_lies_on_the_same_point_of_the_surface() {
+        let plane = Mesh::from(Plane3d::new(Vec3::Y, Vec2::ONE));
+        let triangles = MeshTriangles::from_mesh(&plane).unwrap();
+        let wrap = [Wrap::Clamp; 2];
+        let geometry = TexelGeometry::new(&triangles, &Affine3A::IDENTITY, Vec3::Y, 64, wrap);
+        let frames = Frames::new(&triangles, &geometry, wrap);
+        // The plane in world space: twice as large, turned and moved.
+        let turn = Quat::from_rotation_z(0.7);
+        let world_from_mesh = Affine3A::from_scale_rotation_translation(Vec3::splat(2.0), turn, Vec3::ONE);
+        let hit = Impact {
+            point: world_from_mesh.transform_point3(Vec3::new(0.5, 0.0, -0.25)),
+            normal: turn * Vec3::Y,
+            along: [turn * Vec3::X, turn * Vec3::Z],
+            uv_per_metre: Vec2::splat(0.25),
+            velocity: turn * Vec3::NEG_Y,
+            ..impact(Vec3::ZERO)
+        };
+        let site = Site { frames: &frames, world_from_mesh };
+        let splat = splat(&hit, WeatherEffect { stamp_turn: StampTurn::Flight, ..paint(0.5) }, Some(&site));
+        assert_eq!(splat.in_space, 1);
+        // Half a metre is a quarter in the mesh, an eighth of its width, and twice that is its reach.
+        assert!((splat.reach - 65_536 / 4).abs() < 20, "{}", splat.reach);
+        let away = |mesh: Vec3| {
+            let at = frames.steps(mesh);
+            let away = [0, 1, 2].map(|axis| at[axis] - splat.origin[axis]);
+            [splat.row_s, splat.row_t, splat.row_n]
+                .map(|row| super::super::kernel::framed(row, away, splat.reach))
+        };
+        assert!(away(Vec3::new(0.5, 0.0, -0.25)).iter().all(|part| part.abs() <= 1));
+        for step in [Vec3::X, Vec3::Z] {
+            let [s, t, n] = away(Vec3::new(0.5, 0.0, -0.25) + step * 0.125);
+            let distance = ((s * s + t * t) as f32).sqrt();
+            assert!((distance - 128.0).abs() < 2.0 && n.abs() <= 1, "{s} {t} {n}");
+        }
+    }
+
+    #[test]
+    fn jitter_is_even_and_within_bounds() {
+        let mean: f32 = (0..10_000).map(signed_hash).inspect(|h| assert!(h.abs() <= 1.0)).sum::<f32>() / 1e4;
+        assert!(mean.abs() < 0.02, "{mean}");
+    }
+}
