@@ -136,7 +136,9 @@ fn place_on_map(splat: Splat, offset: vec2<i32>) -> Place {
     }
     let s = vec2(splat.row_s[0], splat.row_s[1]);
     let t = vec2(splat.row_t[0], splat.row_t[1]);
-    return Place(vec2(turned(s, offset), turned(t, offset)), vec2(s.x, t.x), vec2(s.y, t.y), 1024, 256u);
+    // A corner of a turned stamp that hangs out of its box is cut off.
+    let part = select(0u, 256u, on_stamp(offset));
+    return Place(vec2(turned(s, offset), turned(t, offset)), vec2(s.x, t.x), vec2(s.y, t.y), 1024, part);
 }
 
 fn vector(parts: array<i32, 3>) -> vec3<i32> {

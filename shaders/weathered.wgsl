@@ -13,10 +13,11 @@
 #import bevy_weathering::{
     wet_lighting::apply_wet_lighting,
     wet_map::{
-        porous, diffuse_map, specular_map, normal_map, map_sampler, surface_texture, surface_sampler,
+        porous, matter_look, heap_slopes, diffuse_map, specular_map, normal_map, map_sampler, surface_texture, surface_sampler,
         wet_color_texture, wet_color_sampler,
     },
     wet_surface::{Water, apply_model, ripples, water_on},
+    matter::{dust_color_over, matter_cover, roughness_under, snow_albedo},
 }
 
 #ifdef VISIBILITY_RANGE_DITHER
@@ -72,6 +73,32 @@ fn left_behind(color: vec3<f32>, water: Water) -> vec3<f32> {
 }
 #endif
 
+#ifdef WEATHERED_MATTER
+// Dust, mud and snow over a point. They hide what water has done to it, and are wet themselves.
+fn apply_matter(pbr: ptr<function, PbrInput>, water: ptr<function, Water>) {
+    let depths = (*water).matter;
+    let soil = vec2(matter_cover(depths.x, matter_look.grain_mm), matter_cover(depths.y, matter_look.grain_mm));
+    let base = (*pbr).material.base_color;
+    var color = dust_color_over(base.rgb, matter_look.dust_color, matter_look.mud_color, soil, (*water).wetness);
+    let covered = 1.0 - (1.0 - soil.x) * (1.0 - soil.y);
+    let soil_roughness = mix(matter_look.dust_roughness, matter_look.mud_roughness, (*water).wetness);
+    var roughness = roughness_under((*pbr).material.perceptual_roughness, soil_roughness, covered);
+    color = snow_albedo(color, matter_look.snow_color, depths.z);
+    let snow = matter_cover(depths.z, matter_look.flake_mm);
+    roughness = roughness_under(roughness, matter_look.snow_roughness, snow);
+    let hidden = 1.0 - (1.0 - covered) * (1.0 - snow);
+    (*pbr).material.base_color = vec4(color, base.a);
+    (*pbr).material.perceptual_roughness = roughness;
+    (*pbr).material.metallic *= 1.0 - hidden;
+    (*pbr).material.reflectance = mix((*pbr).material.reflectance, vec3(0.35), hidden);
+    // Pores under a cover are not seen; a film on mud is, on snow is not.
+    (*water).wetness *= 1.0 - hidden;
+    (*water).gloss *= 1.0 - hidden;
+    (*water).coverage *= 1.0 - snow;
+    (*water).levelness *= 1.0 - snow;
+}
+#endif
+
 #ifdef WEATHERED_LIGHT
 // The point with the water on it, lit.
 fn weathered_color(pbr_input: PbrInput, in: VertexOutput) -> vec4<f32> {
@@ -97,6 +124,14 @@ fn weathered_color(pbr_input: PbrInput, in: VertexOutput) -> vec4<f32> {
     pbr.material.base_color = vec4(left_behind(pbr.material.base_color.rgb, water), pbr.material.base_color.a);
 #endif
     apply_model(&pbr, &water, surface.r, wet_color * porous.wet_color);
+#ifdef WEATHERED_MATTER
+    apply_matter(&pbr, &water);
+    let heaps = heap_slopes(in.uv);
+    normal = tilt_normal(normal, heaps, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz), dpdx(in.uv), dpdy(in.uv));
+    // What covers a relief evens it out.
+    pbr.N = normalize(mix(tilt_normal(pbr.N, heaps, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz), dpdx(in.uv), dpdy(in.uv)),
+        normal, matter_cover(water.matter.z, matter_look.flake_mm)));
+#endif
 #ifdef WEATHERED_STANDING
     let waves = ripples(in.uv, in.world_position.xyz, water.levelness);
     normal = tilt_normal(normal, -waves.xy, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz), dpdx(in.uv), dpdy(in.uv));

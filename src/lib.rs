@@ -6,6 +6,7 @@ pub mod collision;
 pub mod effect;
 pub mod emitter;
 pub mod material;
+pub mod matter;
 pub mod output;
 pub mod overlay;
 pub mod particle;
@@ -50,6 +51,7 @@ pub mod prelude {
 /// | [`ParticlePlugin`](particle::ParticlePlugin) | moves and retires them | no |
 /// | [`CollisionPlugin`](collision::CollisionPlugin) | finds what they hit | no |
 /// | [`DepositPlugin`](overlay::DepositPlugin) | turns impacts into splats | no |
+/// | [`MatterPlugin`](matter::MatterPlugin) | gives surfaces room for dust, mud and snow | no |
 /// | [`WettingPlugin`](wetting::WettingPlugin) | absorbs, moves and dries water | no |
 /// | [`GpuOverlayPlugin`](overlay::GpuOverlayPlugin) | paints splats into maps | yes |
 /// | [`WaterUploadPlugin`](wetting::gpu::WaterUploadPlugin) | sends water to be drawn | yes |
@@ -71,6 +73,7 @@ impl PluginGroup for WeatheringPlugins {
             .add(particle::ParticlePlugin)
             .add(collision::CollisionPlugin)
             .add(overlay::DepositPlugin)
+            .add(matter::MatterPlugin)
             .add(wetting::WettingPlugin)
             .add(overlay::GpuOverlayPlugin)
             .add(wetting::gpu::WaterUploadPlugin)

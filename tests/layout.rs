@@ -8,6 +8,7 @@ use std::mem::offset_of;
 use bevy::math::{UVec2, Vec3};
 use bevy::render::render_resource::{ShaderType, encase::UniformBuffer};
 use bevy_weathering::material::{GpuDryingPoint, PorousUniform};
+use bevy_weathering::matter::GpuTexelMatter;
 use bevy_weathering::overlay::{RainRing, Splat, SurfaceBatch, TexelFrame, TileHeader};
 use bevy_weathering::particle::{GpuLook, GpuParticle};
 use bevy_weathering::stamps::StampTexel;
@@ -16,6 +17,7 @@ use naga::{Expression, Literal, Module, ScalarKind, TypeInner};
 
 const SPLAT: &str = include_str!("../shaders/splat.wgsl");
 const STAMP: &str = include_str!("../shaders/common/stamp.wgsl");
+const MATTER: &str = include_str!("../shaders/common/matter.wgsl");
 const PARTICLES: &str = include_str!("../shaders/particles.wgsl");
 const WET_MAP: &str = include_str!("../shaders/common/wet_map.wgsl");
 
@@ -139,6 +141,11 @@ fn a_texels_frame_and_a_stamps_texel_are_the_same_rows_on_both_sides() {
     assert_eq!(wgsl_layout(SPLAT, "TexelFrame"), rust_layout!(TexelFrame { xy, z, normal, along_u }));
     let stamp = rust_layout!(StampTexel { diffuse, specular, normal, pad });
     assert_eq!(wgsl_layout(STAMP, "StampTexel"), stamp);
+}
+
+#[test]
+fn the_matter_of_a_texel_is_the_same_row_on_both_sides() {
+    assert_eq!(wgsl_layout(MATTER, "TexelMatter"), rust_layout!(GpuTexelMatter { dust_mud, snow }));
 }
 
 #[test]

@@ -357,7 +357,7 @@ fn bad_scenarios_are_refused_by_file_field_and_value() {
         // Shape.
         ("speed: 1.0", "speed 1.0", &[":20:", "colon"]),
         ("seconds: 1.0", "seconds: 1.0, wetness: 0.5", &[":2:", "`wetness`"]),
-        ("speed: 1.0,", "", &[":22:", "`speed`"]),
+        ("speed: 1.0,", "", &["`emitters[0].speed`", "not given"]),
         ("rate: 200.0", "rate: \"many\"", &[":19:", "float"]),
         ("max_particles: 1000", "max_particles: 99999999999", &[":3:", "out of bounds"]),
         // Numbers.

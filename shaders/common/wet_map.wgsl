@@ -4,6 +4,7 @@
 
 #import bevy_weathering::drying::{Amounts, evolve, water_look}
 #import bevy_weathering::hnat::wet_tau
+#import bevy_weathering::matter::{TexelMatter, matter_depths, settled_soil}
 #import bevy_weathering::ripples::{ring_slope, RING_SECONDS}
 
 // Constants of a surface; the twin of `PorousUniform` in `src/material/extension.rs`.
@@ -89,6 +90,20 @@ struct DryingPoint {
     sun_per_tick: f32,
 }
 
+// How dust, mud and snow look; the twin of `MatterUniform` in `src/material/extension.rs`.
+struct MatterUniform {
+    // Linear colours and perceptual roughnesses, 0..=1.
+    dust_color: vec3<f32>,
+    dust_roughness: f32,
+    mud_color: vec3<f32>,
+    mud_roughness: f32,
+    snow_color: vec3<f32>,
+    snow_roughness: f32,
+    // Width of a grain and of a flake, mm.
+    grain_mm: f32,
+    flake_mm: f32,
+}
+
 // The time, and the integral of what the weather takes.
 struct Clock {
     // Ticks since the start, and ticks per second.
@@ -145,6 +160,8 @@ const STEEPEST_DROP_NL: f32 = 65000.0;
 @group(#{MATERIAL_BIND_GROUP}) @binding(111) var wet_color_sampler: sampler;
 @group(#{MATERIAL_BIND_GROUP}) @binding(112) var played_map: texture_2d<f32>;
 @group(#{MATERIAL_BIND_GROUP}) @binding(113) var played_sampler: sampler;
+@group(#{MATERIAL_BIND_GROUP}) @binding(114) var<storage, read> matter: array<TexelMatter>;
+@group(#{MATERIAL_BIND_GROUP}) @binding(115) var<uniform> matter_look: MatterUniform;
 
 fn has_flag(flag: u32) -> bool {
     return (porous.flags & flag) != 0u;
@@ -197,6 +214,8 @@ struct Held {
     look: vec3<f32>,
     // Efflorescence and tide mark, 0..=1.
     marks: vec2<f32>,
+    // Loose and bound soil, snow, mm.
+    matter: vec3<f32>,
 }
 
 // Water that has to dry in one place until there is no more efflorescence to see, mm, and what a cycle adds to a tide mark:
@@ -214,6 +233,9 @@ fn texel_held(texel: vec2<i32>) -> Held {
     var held: Held;
     let marks = unpack4x8unorm(stored.marks);
     held.marks = marks.xy;
+#ifdef WEATHERED_MATTER
+    held.matter = matter_depths(matter[tile * TILE_SIZE * TILE_SIZE + (y % TILE_SIZE) * TILE_SIZE + x % TILE_SIZE]);
+#endif
     if stored.tick == 0u || stored.tick > clock.tick {
         return held;
     }
@@ -227,6 +249,9 @@ fn texel_held(texel: vec2<i32>) -> Held {
     let shown = vec2(bytes.x, marks.z);
     held.look = water_look(now.pores_mm, porous.visible_mm, shown, seconds, porous.t_fill);
     held.look.z *= now.film_mm;
+#ifdef WEATHERED_MATTER
+    held.matter = vec3(settled_soil(held.matter.x, held.matter.y, before.film_mm, now.film_mm), held.matter.z);
+#endif
 #ifdef WEATHERED_MARKS
     let dried = max(before.pores_mm - now.film_mm - now.pores_mm, 0.0);
     let cycle = min(dried / porous.visible_mm, 1.0) * marks.w;
@@ -236,7 +261,7 @@ fn texel_held(texel: vec2<i32>) -> Held {
 }
 
 fn mix_held(a: Held, b: Held, part: f32) -> Held {
-    return Held(mix(a.look, b.look, part), mix(a.marks, b.marks, part));
+    return Held(mix(a.look, b.look, part), mix(a.marks, b.marks, part), mix(a.matter, b.matter, part));
 }
 
 // What a point holds and how it looks now; bilinear between texels.
@@ -248,6 +273,36 @@ fn held_at(uv: vec2<f32>) -> Held {
     let upper = mix_held(texel_held(texel), texel_held(texel + vec2(1, 0)), part.x);
     let lower = mix_held(texel_held(texel + vec2(0, 1)), texel_held(texel + vec2(1, 1)), part.x);
     return mix_held(upper, lower, part.y);
+}
+
+// Depth of snow and soil at a texel, mm, for slopes.
+fn heap_mm(texel: vec2<i32>) -> f32 {
+    let size = i32(porous.size);
+    let x = wrapped(texel.x, size, has_flag(FLAG_CLAMP_U));
+    let y = wrapped(texel.y, size, has_flag(FLAG_CLAMP_V));
+    let tile = (y / TILE_SIZE) * (size / TILE_SIZE) + x / TILE_SIZE;
+    let depths = matter_depths(matter[tile * TILE_SIZE * TILE_SIZE + (y % TILE_SIZE) * TILE_SIZE + x % TILE_SIZE]);
+    return depths.x + depths.y + depths.z;
+}
+
+// How fast what lies here falls along u and v: the slopes of its surface.
+fn heap_slopes(uv: vec2<f32>) -> vec2<f32> {
+    let position = uv * f32(porous.size) - 0.5;
+    let corner = floor(position);
+    let part = position - corner;
+    let texel = vec2<i32>(corner);
+    var sum = vec2(0.0);
+    for (var i = 0; i < 4; i += 1) {
+        let step = vec2(i % 2, i / 2);
+        let at = texel + step;
+        let weight = select(1.0 - part, part, vec2<bool>(step));
+        let along = vec2(
+            heap_mm(at - vec2(1, 0)) - heap_mm(at + vec2(1, 0)),
+            heap_mm(at - vec2(0, 1)) - heap_mm(at + vec2(0, 1)),
+        );
+        sum += weight.x * weight.y * along;
+    }
+    return sum / (2000.0 * porous.texel_metres);
 }
 
 // How wet the played map says a point is, 0..=1. Grey g wets at (1 - g)(1 - t_fill), 0 never; drying is that backwards.

@@ -27,6 +27,8 @@ struct Water {
     gloss: f32,
     // Efflorescence and tide mark, 0..=1.
     marks: vec2<f32>,
+    // Loose and bound soil, snow, mm.
+    matter: vec3<f32>,
     // Depth above the matter, mm.
     film_mm: f32,
     // Part of the point under water, 0..=1.
@@ -43,12 +45,13 @@ const ACCUMULATED_MM: f32 = 5.0;
 // Water that fell on a point or stands there. height, paint: see `flood`.
 fn water_on(uv: vec2<f32>, height: f32, paint: f32) -> Water {
     var water: Water;
-#ifdef WEATHERED_WATER
+#ifdef WEATHERED_HELD
     let held = held_at(uv);
     water.wetness = held.look.x;
     water.gloss = held.look.y;
     water.film_mm = held.look.z;
     water.marks = held.marks;
+    water.matter = held.matter;
 #endif
 #ifdef WEATHERED_PLAYED_MAP
     let played = played_at(uv);

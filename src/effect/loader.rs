@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use bevy::asset::{AssetLoader, LoadContext, io::Reader};
 use bevy::prelude::*;
 
-use super::{DropSizes, Paint, WeatherEffect};
+use super::{Carries, DropSizes, Paint, WeatherEffect};
 use crate::stamps::StampError;
 
 /// Loads a [`WeatherEffect`] from RON.
@@ -97,6 +97,9 @@ impl WeatherEffect {
         let zero_to = |field, value: f32, max: f32, expected| within(field, value, 0.0, max, expected);
         zero_to("volume_mm3", self.volume_mm3, Self::MAX_VOLUME_MM3, "0 to 1000000 (a litre)")?;
         zero_to("terminal_speed", self.terminal_speed.unwrap_or(0.0), 1000.0, "0 to 1000 m/s")?;
+        if let Carries::Mud(water) = self.carries {
+            within("carries", water, 0.0, 1.0, "0 to 1")?;
+        }
         match self.drops {
             DropSizes::Same(mm) => within("drops", mm, 0.001, 100.0, "0.001 to 100 mm")?,
             DropSizes::MarshallPalmer(rate) => within("drops", rate, 0.1, 300.0, "0.1 to 300 mm/h")?,

@@ -28,6 +28,8 @@ pub struct WeatherEffect {
     /// What a particle carries, in mm³ (1 mm³ is 1 µl), if its emitter has no flow of its own. 0 or more, at most
     /// [`Self::MAX_VOLUME_MM3`].
     pub volume_mm3: f32,
+    /// What that is.
+    pub carries: Carries,
     /// How large the drops are that it stands for. Their speed is what air slows them down to, if `terminal_speed` is none.
     pub drops: DropSizes,
     /// Speed at which drag balances gravity, in m/s; 0 switches drag (and wind) off. Not given: that of its drops.
@@ -58,6 +60,32 @@ pub struct WeatherEffect {
     #[serde(skip)]
     #[reflect(ignore)]
     pub stamp_set: Option<Arc<StampSet>>,
+}
+
+/// What particles of an effect are made of.
+#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Default)]
+pub enum Carries {
+    /// Water.
+    #[default]
+    Water,
+    /// Dry grains; their volume without pores.
+    Dust,
+    /// Soil and water; the part of it that is water, 0..=1.
+    Mud(f32),
+    /// Snow; the volume of its water.
+    Snow,
+}
+
+impl Carries {
+    /// Of a particle's volume what is water, and what is not. To the nanolitre.
+    pub fn parts_nl(self, volume_nl: u32) -> (u32, u32) {
+        let water = match self {
+            Self::Water => volume_nl,
+            Self::Dust | Self::Snow => 0,
+            Self::Mud(part) => (u64::from(volume_nl) * (part.clamp(0.0, 1.0) * 256.0) as u64 / 256) as u32,
+        };
+        (water, volume_nl - water)
+    }
 }
 
 /// A colour and how much of it a stamp lays over what was there.
@@ -117,6 +145,7 @@ impl Default for WeatherEffect {
     fn default() -> Self {
         Self {
             volume_mm3: 4.19,
+            carries: Carries::Water,
             drops: DropSizes::default(),
             terminal_speed: None,
             gravity_scale: 1.0,

@@ -36,6 +36,11 @@ impl EffectRow {
         self.effect = Some(effect);
     }
 
+    /// Water of a particle of this volume, nanolitres.
+    pub fn water_nl(&self, volume_nl: u32) -> u32 {
+        self.effect.as_ref().map_or(0, |effect| effect.carries.parts_nl(volume_nl).0)
+    }
+
     /// Speed at which drag balances gravity, m/s, for drops of a class; 0 is no drag.
     pub fn terminal_speed(&self, class: usize) -> f32 {
         let given = self.effect.as_ref().and_then(|effect| effect.terminal_speed);

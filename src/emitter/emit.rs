@@ -75,11 +75,6 @@ impl NewParticles {
         self.next_sequence = next_sequence;
     }
 
-    /// Water of those that wait to be spawned, nanolitres.
-    pub fn waiting_nl(&self) -> u64 {
-        self.particles.iter().map(|particle| u64::from(particle.volume_nl)).sum()
-    }
-
     /// Adds one more particle, which gets the next number.
     pub fn push(&mut self, particle: impl FnOnce(Sequence) -> Particle) {
         self.particles.push(particle(Sequence(self.next_sequence)));
@@ -138,7 +133,7 @@ pub fn emit_particles(
             let (position, velocity) = emitter.sample(&world_from_emitter, &mut rng, fall_speed);
             let born_at = ((first + f64::from(i) * interval) * 65_536.0).clamp(0.0, 65_535.0) as u16;
             let volume_nl = state.water_nl(volume_mm3);
-            water.emitted_nl += u64::from(volume_nl);
+            water.emitted_nl += u64::from(row.water_nl(volume_nl));
             let lifespan = Lifespan { ticks_left, born_at };
             new.push(|sequence| Particle {
                 position,

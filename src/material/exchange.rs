@@ -11,6 +11,7 @@ use super::{
     WettingTextures,
 };
 use crate::clock::WeatheringClock;
+use crate::matter::MatterLook;
 use crate::overlay::{Overlays, SurfaceTraces, TexelArea, Weatherable};
 
 /// The material a weathered entity had. Its asset may go on being edited: the weathered form follows.
@@ -51,6 +52,7 @@ fn extension(
     ),
     buffer: &ClockBuffer,
     clock: &WeatheringClock,
+    matter: &MatterLook,
 ) -> PorousExtension {
     let none = WettingTextures::default();
     let look = SurfaceLook {
@@ -64,7 +66,7 @@ fn extension(
         traces: *traces,
     };
     let played = played.map(|played| played.map.clone());
-    PorousExtension::new(look.key(), look.uniform(), maps, look.textures, played, buffer.0.clone())
+    PorousExtension::new(look.key(), look.uniform(), maps, look.textures, played, buffer.0.clone(), matter)
 }
 
 /// The dry material as the weathered one needs it.
@@ -84,6 +86,7 @@ pub(super) fn exchange_materials(
     mut commands: Commands,
     buffer: Res<ClockBuffer>,
     clock: Res<WeatheringClock>,
+    matter: Res<MatterLook>,
     deferred_cameras: Query<(), With<DeferredPrepass>>,
     standard: Res<Assets<StandardMaterial>>,
     mut weathered: ResMut<Assets<WeatheredMaterial>>,
@@ -94,7 +97,7 @@ pub(super) fn exchange_materials(
         if dry.opaque_render_method != OpaqueRendererMethod::Forward && !deferred_cameras.is_empty() {
             info_once!("weathered surfaces are drawn forward, before cameras with a deferred prepass, too");
         }
-        let extension = extension(surface, &buffer, &clock);
+        let extension = extension(surface, &buffer, &clock, &matter);
         let handle = weathered.add(WeatheredMaterial { base: weathered_base(dry, &extension), extension });
         commands
             .entity(entity)
@@ -139,6 +142,7 @@ pub(super) fn follow_surfaces(
     mut commands: Commands,
     buffer: Res<ClockBuffer>,
     clock: Res<WeatheringClock>,
+    matter: Res<MatterLook>,
     changes: Res<ShaderChanges>,
     standard: Res<Assets<StandardMaterial>>,
     mut weathered: ResMut<Assets<WeatheredMaterial>>,
@@ -147,7 +151,7 @@ pub(super) fn follow_surfaces(
 ) {
     for (entity, surface, dry, handle) in &changed {
         let Some(mut material) = weathered.get_mut(handle) else { continue };
-        let extension = extension(surface, &buffer, &clock);
+        let extension = extension(surface, &buffer, &clock, &matter);
         if let Some(dry) = standard.get(&dry.0) {
             material.base = weathered_base(dry, &extension);
         }

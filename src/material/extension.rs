@@ -12,6 +12,7 @@ use bevy::render::storage::ShaderBuffer;
 use bevy::shader::ShaderRef;
 
 use super::{PorousKey, WettingTextures};
+use crate::matter::MatterLook;
 use crate::overlay::Overlays;
 
 /// A `StandardMaterial` that gets wet.
@@ -57,6 +58,44 @@ pub struct PorousExtension {
     #[texture(112)]
     #[sampler(113)]
     pub played: Option<Handle<Image>>,
+    /// See [`Overlays::matter`].
+    #[storage(114, read_only, visibility(fragment))]
+    pub matter: Handle<ShaderBuffer>,
+    /// See [`MatterLook`](crate::matter::MatterLook).
+    #[uniform(115)]
+    pub look: MatterUniform,
+}
+
+/// [`MatterLook`](crate::matter::MatterLook) as the shader reads it: `MatterUniform` in `shaders/common/wet_map.wgsl`, where the
+/// fields are told.
+#[derive(ShaderType, Reflect, Debug, Clone, Copy, Default, PartialEq)]
+#[expect(missing_docs, reason = "told in the shader; tests/layout.rs compares the two")]
+pub struct MatterUniform {
+    pub dust_color: Vec3,
+    pub dust_roughness: f32,
+    pub mud_color: Vec3,
+    pub mud_roughness: f32,
+    pub snow_color: Vec3,
+    pub snow_roughness: f32,
+    pub grain_mm: f32,
+    pub flake_mm: f32,
+}
+
+impl From<&MatterLook> for MatterUniform {
+    fn from(look: &MatterLook) -> Self {
+        let color = |color: [f32; 3]| Vec3::from_array(color).clamp(Vec3::ZERO, Vec3::ONE);
+        let part = |part: f32| part.clamp(0.0, 1.0);
+        Self {
+            dust_color: color(look.dust_color),
+            dust_roughness: part(look.dust_roughness),
+            mud_color: color(look.mud_color),
+            mud_roughness: part(look.mud_roughness),
+            snow_color: color(look.snow_color),
+            snow_roughness: part(look.snow_roughness),
+            grain_mm: look.grain_mm.max(1e-3),
+            flake_mm: look.flake_mm.max(1e-3),
+        }
+    }
 }
 
 /// [`PorousMaterial`](super::PorousMaterial) and [`StandingWater`](super::StandingWater) as the shader reads them:
@@ -105,6 +144,7 @@ impl PorousExtension {
         textures: &WettingTextures,
         played: Option<Handle<Image>>,
         clock: Handle<ShaderBuffer>,
+        look: &MatterLook,
     ) -> Self {
         Self {
             key,
@@ -118,6 +158,8 @@ impl PorousExtension {
             surface: textures.surface.clone(),
             wet_color: textures.wet_color.clone(),
             played,
+            matter: maps.matter.clone(),
+            look: look.into(),
         }
     }
 }

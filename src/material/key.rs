@@ -12,6 +12,8 @@ use super::WettingModel;
 pub struct PorousKey {
     /// Water fell on it.
     pub water: bool,
+    /// Dust, mud or snow did.
+    pub matter: bool,
     /// Colour, gloss or relief did.
     pub paint: bool,
     /// It has [`StandingWater`](super::StandingWater).
@@ -71,10 +73,12 @@ impl ModelKind {
 
 impl PorousKey {
     pub(super) fn shader_defs(self) -> impl Iterator<Item = ShaderDefVal> {
-        let own_light = self.water || self.standing || self.played_map || self.unlike_standard;
+        let own_light = self.water || self.matter || self.standing || self.played_map || self.unlike_standard;
         let defs = [
             (own_light, "WEATHERED_LIGHT"),
             (self.water, "WEATHERED_WATER"),
+            (self.water || self.matter, "WEATHERED_HELD"),
+            (self.matter, "WEATHERED_MATTER"),
             (self.paint, "WEATHERED_PAINT"),
             (self.standing, "WEATHERED_STANDING"),
             (self.marks, "WEATHERED_MARKS"),

@@ -35,7 +35,7 @@ use crate::wetting::gpu::PackWater;
 
 pub use clock::{ClockBuffer, GpuDryingPoint};
 pub use exchange::DryMaterial;
-pub use extension::{PorousExtension, PorousUniform, WeatheredMaterial};
+pub use extension::{MatterUniform, PorousExtension, PorousUniform, WeatheredMaterial};
 pub use key::{ModelKind, PorousKey};
 pub use played::{PlayedWetMap, Playing};
 pub use porous::{
@@ -68,6 +68,7 @@ impl Plugin for PorousMaterialPlugin {
         load_shader_library!(app, "../../shaders/common/flood.wgsl");
         load_shader_library!(app, "../../shaders/common/ripples.wgsl");
         load_shader_library!(app, "../../shaders/common/drying.wgsl");
+        load_shader_library!(app, "../../shaders/common/matter.wgsl");
         load_shader_library!(app, "../../shaders/common/wet_map.wgsl");
         load_shader_library!(app, "../../shaders/common/wet_surface.wgsl");
         load_shader_library!(app, "../../shaders/common/wet_layers.wgsl");

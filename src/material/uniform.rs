@@ -53,6 +53,7 @@ impl SurfaceLook<'_> {
         let solid = self.porous.texture == TextureMeaning::Solid && self.porous.model.pores().is_some();
         PorousKey {
             water: self.traces.water,
+            matter: self.traces.matter,
             paint: self.traces.paint,
             standing: self.standing.is_some_and(|water| water.flood != Flood::None),
             unlike_standard: solid || self.porous.brdf == BaseBrdf::BlinnPhong,

@@ -39,6 +39,7 @@ pub use texel::{MatterKind, TexelMatter};
 pub(crate) use advance::{MatterScratch, advance_matter, is_at_rest};
 pub(crate) use settle::deposit;
 pub(crate) use surface::MatterTiles;
+pub(crate) use wash::bind_dried;
 
 /// Matter that waits to be put on one surface, in the order of its impacts.
 #[derive(Component, Debug, Default)]

@@ -142,8 +142,10 @@ impl Place {
             return Self { offset, along: [[1, 0], [0, 1]], unit: 1, part: 256 };
         }
         let [[ss, st, _], [ts, tt, _]] = [splat.row_s, splat.row_t];
+        // A corner of a turned stamp that hangs out of its box is cut off.
+        let part = if on_stamp(offset) { 256 } else { 0 };
         let offset = [turned([ss, st], offset), turned([ts, tt], offset)];
-        Self { offset, along: [[ss, ts], [st, tt]], unit: 1024, part: 256 }
+        Self { offset, along: [[ss, ts], [st, tt]], unit: 1024, part }
     }
 
     fn in_space(splat: &Splat, frame: &TexelFrame) -> Option<Self> {

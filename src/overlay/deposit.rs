@@ -8,7 +8,8 @@ use super::stamping::{Site, splat_from_impact};
 use super::{Splat, StampAtlas, StampSpace, TexelArea, Weatherable};
 use crate::clock::WeatheringClock;
 use crate::collision::{Impacts, SurfaceCollider};
-use crate::effect::{EffectTable, RefreshEffects};
+use crate::effect::{Carries, EffectTable, RefreshEffects};
+use crate::matter::{Deposit, MatterKind, MatterQueue, SurfaceMatter};
 use crate::schedule::{WeatheringSystems, WeatheringTick};
 use crate::wetting::{Drop, DropQueue, MeasureSurfaces, SurfaceWater};
 
@@ -29,6 +30,9 @@ pub struct SurfaceTraces {
     pub water: bool,
     /// Colour, gloss or relief.
     pub paint: bool,
+    /// Dust, mud or snow.
+    #[serde(default)]
+    pub matter: bool,
 }
 
 impl SplatQueue {
@@ -123,13 +127,14 @@ pub(crate) fn measure_texels(
 /// Tells those who draw what has come.
 pub(crate) fn note_traces(
     mut surfaces: Query<
-        (&SplatQueue, Option<&SurfaceWater>, &mut SurfaceTraces),
+        (&SplatQueue, Option<&SurfaceWater>, Option<&SurfaceMatter>, &mut SurfaceTraces),
         Or<(Changed<SplatQueue>, Changed<SurfaceWater>)>,
     >,
 ) {
-    for (queue, water, mut traces) in &mut surfaces {
+    for (queue, water, matter, mut traces) in &mut surfaces {
+        let matter = traces.matter || matter.is_some_and(|matter| !matter.is_empty());
         let water = traces.water || water.is_some_and(SurfaceWater::is_wet);
-        traces.set_if_neq(SurfaceTraces { water, ..queue.traces });
+        traces.set_if_neq(SurfaceTraces { water, matter, ..queue.traces });
     }
 }
 
@@ -138,6 +143,7 @@ type Stamped = (
     &'static mut SplatQueue,
     &'static mut SurfaceTotals,
     Option<&'static mut DropQueue>,
+    Option<&'static mut MatterQueue>,
     Option<&'static SurfaceFrames>,
     Option<&'static GlobalTransform>,
 );
@@ -150,24 +156,44 @@ pub fn deposit_splats(
     mut surfaces: Query<Stamped>,
 ) {
     for impact in &impacts.0 {
-        let Ok((surface, mut queue, mut totals, drops, frames, transform)) = surfaces.get_mut(impact.surface)
+        let Ok((surface, mut queue, mut totals, drops, matter, frames, transform)) =
+            surfaces.get_mut(impact.surface)
         else {
             continue;
         };
         let Some(row) = effects.row(impact.effect) else { continue };
         let Some(effect) = &row.effect else { continue };
         totals.impacts += 1;
-        totals.water_nl += u64::from(impact.volume_nl);
+        let (water_nl, solid_nl) = effect.carries.parts_nl(impact.volume_nl);
+        totals.water_nl += u64::from(water_nl);
         let site = frames
             .zip(transform)
             .map(|(frames, transform)| Site { frames: &frames.0, world_from_mesh: transform.affine() });
-        let splat = splat_from_impact(impact, row, effect, surface, site.as_ref(), clock.tick());
+        let splat = splat_from_impact(impact, row, effect, surface, site.as_ref(), clock.tick(), water_nl);
         queue.push(splat);
+        if let Some(mut matter) = matter
+            && let Some(kind) = kind_of(effect.carries)
+            && solid_nl > 0
+        {
+            let Splat { center, radius, .. } = splat;
+            matter.0.push(Deposit { center, radius, kind, volume_nl: solid_nl });
+        }
         if let Some(mut drops) = drops
             && splat.water_nl > 0
         {
-            drops.0.push(Drop { center: splat.center, radius: splat.radius, water_nl: splat.water_nl });
+            let speed_mm = (impact.velocity.length() * 1000.0) as u32;
+            let Splat { center, radius, water_nl, .. } = splat;
+            drops.0.push(Drop { center, radius, water_nl, speed_mm });
         }
+    }
+}
+
+fn kind_of(carries: Carries) -> Option<MatterKind> {
+    match carries {
+        Carries::Water => None,
+        Carries::Dust => Some(MatterKind::Dust),
+        Carries::Mud(_) => Some(MatterKind::Mud),
+        Carries::Snow => Some(MatterKind::Snow),
     }
 }
 

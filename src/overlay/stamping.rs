@@ -64,6 +64,7 @@ pub(super) fn splat_from_impact(
     surface: &Weatherable,
     site: Option<&Site>,
     tick: u32,
+    water_nl: u32,
 ) -> Splat {
     let size = surface.texels();
     let own = radius(impact, effect, row);
@@ -78,7 +79,7 @@ pub(super) fn splat_from_impact(
     let mut splat = Splat {
         center: Splat::center_from_uv(impact.uv, size, surface.wrap()),
         radius: Splat::radius_from_uv(impact.uv_per_metre * long, size),
-        water_nl: impact.volume_nl,
+        water_nl,
         tick,
         diffuse: pack_unorm([r, g, b, effect.diffuse.opacity]),
         specular: pack_unorm([reflectance, smoothness, unused, effect.specular.opacity]),
@@ -173,7 +174,7 @@ mod tests {
         table.insert(Handle::default(), effect);
         let row = &table.rows()[0];
         let surface = Weatherable { map_size: 64, wrap_u: Wrap::Clamp, wrap_v: Wrap::Clamp, ..default() };
-        splat_from_impact(impact, row, row.effect.as_ref().unwrap(), &surface, site, 1)
+        splat_from_impact(impact, row, row.effect.as_ref().unwrap(), &surface, site, 1, impact.volume_nl)
     }
 
     fn paint(stamp_radius: f32) -> WeatherEffect {

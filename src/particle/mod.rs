@@ -122,12 +122,12 @@ pub struct WaterCounts {
 }
 
 impl WaterCounts {
-    fn expire(&mut self, effect: EffectIndex, volume_nl: u32) {
+    fn expire(&mut self, effect: EffectIndex, water_nl: u32) {
         let row = usize::from(effect.0);
         if self.expired_nl.len() <= row {
             self.expired_nl.resize(row + 1, 0);
         }
-        self.expired_nl[row] += u64::from(volume_nl);
+        self.expired_nl[row] += u64::from(water_nl);
     }
 }
 

@@ -3,12 +3,14 @@
 use bevy::prelude::*;
 
 use super::{ParticleCounts, Particles, WaterCounts};
+use crate::effect::EffectTable;
 
 /// Takes out the particles that hit a surface or whose time ran out, and ends the first tick of the newly born.
 pub fn retire_particles(
     mut particles: ResMut<Particles>,
     mut counts: ResMut<ParticleCounts>,
     mut water: ResMut<WaterCounts>,
+    effects: Res<EffectTable>,
 ) {
     let counts = counts.bypass_change_detection();
     particles.bypass_change_detection().retire(|dead| {
@@ -17,7 +19,8 @@ pub fn retire_particles(
             counts.hit += 1;
         } else {
             counts.expired += 1;
-            water.expire(dead.effect, dead.volume_nl);
+            let water_nl = effects.row(dead.effect).map_or(0, |row| row.water_nl(dead.volume_nl));
+            water.expire(dead.effect, water_nl);
         }
     });
 }
@@ -26,12 +29,17 @@ pub fn retire_particles(
 mod tests {
     use super::super::{Lifespan, Particle, Sequence};
     use super::*;
-    use crate::effect::EffectIndex;
+    use crate::effect::{EffectIndex, WeatherEffect};
 
     #[test]
     fn the_dead_go_and_are_counted_by_cause() {
         let mut world = World::new();
         world.init_resource::<WaterCounts>();
+        let mut effects = EffectTable::default();
+        effects.insert(Handle::default(), WeatherEffect::default());
+        let other = Handle::Uuid(bevy::asset::uuid::Uuid::from_u128(7), std::marker::PhantomData);
+        effects.insert(other, WeatherEffect::default());
+        world.insert_resource(effects);
         world.init_resource::<Particles>();
         world.insert_resource(ParticleCounts { emitted: 4, alive: 4, ..default() });
         let particle = |ticks_left, number| Particle {

@@ -10,6 +10,7 @@ use image::{ImageFormat, Luma, Rgba};
 use super::{ReplayError, Run, give_up_after};
 use crate::clock::WeatheringClock;
 use crate::material::PorousMaterial;
+use crate::matter::SurfaceMatter;
 use crate::overlay::{CpuMaps, Overlays, SplatStats, SurfaceTotals, Weatherable};
 use crate::picture::{square, write_picture};
 use crate::scenario::ScenarioSurface;
@@ -40,6 +41,8 @@ pub struct SurfaceMaps {
     pub water: SurfaceWater,
     /// Where that water is.
     pub stock: Stock,
+    /// Its dust, mud and snow.
+    pub matter: SurfaceMatter,
     /// Ticks per second of `since`.
     pub hz: u32,
 }
@@ -59,12 +62,14 @@ impl Run<'_> {
         let world = self.app.world_mut();
         let mut query = world.query::<(
             (Entity, &ScenarioSurface, &Weatherable, &SurfaceWater, &WetGeometry),
-            (Option<&Exposure>, Option<&PorousMaterial>, Option<&CpuMaps>, Option<&Overlays>),
+            (Option<&Exposure>, Option<&PorousMaterial>, Option<&CpuMaps>, Option<&Overlays>, &SurfaceMatter),
         )>();
         let mut surfaces = Vec::new();
         let mut requests = Vec::new();
         let default = PorousMaterial::default();
-        for ((entity, surface, maps, water, geometry), (exposure, material, cpu, gpu)) in query.iter(world) {
+        for ((entity, surface, maps, water, geometry), (exposure, material, cpu, gpu, matter)) in
+            query.iter(world)
+        {
             let material = material.unwrap_or(&default);
             let now = Now::new(clock.tick(), clock.hz(), &drying, &geometry.0, exposure, material);
             let wetness = (0..maps.texels().pow(2)).map(|texel| wetness_of(water, &now, texel)).collect();
@@ -79,6 +84,7 @@ impl Run<'_> {
                 wet_fraction: f64::from(summary(water, &now).wet_fraction),
                 water: water.clone(),
                 stock: water.stock(&now),
+                matter: matter.clone(),
                 hz: clock.hz(),
             };
             if let Some(cpu) = cpu {

@@ -6,9 +6,10 @@ use serde::Serialize;
 use super::{ReplayOptions, SurfaceMaps};
 use crate::clock::WeatheringClock;
 use crate::collision::ColliderReport;
+use crate::effect::EffectTable;
 use crate::emitter::{EmissionSeed, NewParticles};
 use crate::overlay::SurfaceTotals;
-use crate::particle::{ParticleCounts, Particles, WaterCounts};
+use crate::particle::{Particle, ParticleCounts, Particles, WaterCounts};
 use crate::scenario::{Digest, ScenarioSurface, amounts_digest};
 use crate::wetting::{DripEffect, WettingStats};
 
@@ -73,13 +74,25 @@ pub struct SurfaceReport {
     pub dripped_mm3: f64,
     /// Part of its area that looks wet, 0..=1.
     pub wet_fraction: f64,
+    /// Loose grains on it, mm³.
+    pub dust_mm3: f64,
+    /// Bound soil on it, mm³.
+    pub mud_mm3: f64,
+    /// Snow on it, mm³ of water.
+    pub snow_mm3: f64,
+    /// Dust and mud that left it with water, mm³.
+    pub washed_off_mm3: f64,
+    /// Snow that slid off it, mm³ of water.
+    pub slid_off_mm3: f64,
 }
 
-/// Where all the water is, mm³: `emitted = on_surfaces + evaporated + run_off + missed + in_flight`, in whole nanolitres.
+/// Where all the water is, mm³: `emitted + melted = on_surfaces + evaporated + run_off + missed + in_flight`, in whole nanolitres.
 #[derive(Serialize, Debug, Clone, Copy, PartialEq)]
 pub struct WaterReport {
     /// Sent out by emitters.
     pub emitted_mm3: f64,
+    /// Was snow on a surface.
+    pub melted_mm3: f64,
     /// Film and absorbed.
     pub on_surfaces_mm3: f64,
     /// Gone into the air.
@@ -90,7 +103,7 @@ pub struct WaterReport {
     pub missed_mm3: f64,
     /// Still in flight.
     pub in_flight_mm3: f64,
-    /// What the sum differs by, in parts of what was emitted.
+    /// What the sum differs by, in parts of what came.
     pub imbalance: f64,
 }
 
@@ -141,6 +154,11 @@ pub(super) fn report(
                 evaporated_mm3: mm3(maps.stock.evaporated),
                 dripped_mm3: mm3(maps.water.ledger().dripped),
                 wet_fraction: maps.wet_fraction,
+                dust_mm3: mm3(maps.matter.stock().dust),
+                mud_mm3: mm3(maps.matter.stock().mud),
+                snow_mm3: mm3(maps.matter.stock().snow),
+                washed_off_mm3: mm3(maps.matter.ledger().washed_off),
+                slid_off_mm3: mm3(maps.matter.ledger().slid_off),
             };
             Some((surface.index, row))
         })
@@ -171,7 +189,7 @@ pub(super) fn report(
             tiles_spread: stats.tiles_spread(),
         },
         surfaces: surfaces.into_iter().map(|(_, row)| row).collect(),
-        digest: amounts_digest(digest, maps.iter().map(|maps| &maps.water)),
+        digest: amounts_digest(digest, maps.iter().map(|maps| (&maps.water, &maps.matter))),
         timing,
     }
 }
@@ -182,16 +200,21 @@ fn water_report(world: &mut World, maps: &[SurfaceMaps]) -> WaterReport {
     let sum = |of: &dyn Fn(&SurfaceMaps) -> u64| -> f64 {
         maps.iter().map(|maps| maps.water.units().mm3(of(maps))).sum::<f64>() + 0.0
     };
-    let flying: u64 = world.resource::<Particles>().volumes_nl().iter().copied().map(u64::from).sum();
-    let in_flight = flying + world.resource::<NewParticles>().waiting_nl();
+    let effects = world.resource::<EffectTable>();
+    let waiting = world.resource::<NewParticles>().waiting().iter().copied();
+    let water_of = |particle: Particle| {
+        effects.row(particle.effect).map_or(0, |row| u64::from(row.water_nl(particle.volume_nl)))
+    };
+    let in_flight: u64 = world.resource::<Particles>().iter().chain(waiting).map(water_of).sum();
     let counts = world.resource::<WaterCounts>();
-    let drips = world.get_resource::<DripEffect>().and_then(|drips| drips.index).map(|index| index.0);
+    let drips = world.get_resource::<DripEffect>().and_then(|drips| drips.rows).map(|[drop, _]| drop.0);
     let expired = |dripped: bool| -> u64 {
         let rows = counts.expired_nl.iter().enumerate();
         rows.filter(|(row, _)| (drips.map(usize::from) == Some(*row)) == dripped).map(|(_, nl)| nl).sum()
     };
     let mut report = WaterReport {
         emitted_mm3: nl(counts.emitted_nl),
+        melted_mm3: sum(&|maps| maps.matter.ledger().melted),
         on_surfaces_mm3: sum(&|maps| maps.stock.film + maps.stock.pores),
         evaporated_mm3: sum(&|maps| maps.stock.evaporated),
         run_off_mm3: nl(expired(true)) + sum(&|maps| maps.water.ledger().spilled),
@@ -204,8 +227,9 @@ fn water_report(world: &mut World, maps: &[SurfaceMaps]) -> WaterReport {
         + report.run_off_mm3
         + report.missed_mm3
         + report.in_flight_mm3;
-    if report.emitted_mm3 > 0.0 {
-        report.imbalance = (report.emitted_mm3 - found) / report.emitted_mm3;
+    let came = report.emitted_mm3 + report.melted_mm3;
+    if came > 0.0 {
+        report.imbalance = (came - found) / came;
     }
     report
 }

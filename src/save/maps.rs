@@ -7,6 +7,7 @@ use image::{ImageFormat, LumaA, Rgba};
 use tempfile::TempDir;
 
 use super::{SaveError, SavedScene, SavedSurface, SceneState, SurfaceState, VERSION};
+use crate::matter::{SurfaceMatter, TexelMatter};
 use crate::output::write_atomic;
 use crate::overlay::{TILE_SIZE, Weatherable, Wrap};
 use crate::picture::{read_picture, square, write_picture};
@@ -16,8 +17,22 @@ use crate::wetting::{Marks, SurfaceWater, TexelWater};
 const STATE: &str = "state.ron";
 
 /// The maps of a surface; see [`file`].
-const MAPS: [&str; 10] =
-    ["diffuse", "specular", "normal", "film", "pores", "since", "look", "tiles", "efflorescence", "tide"];
+const MAPS: [&str; 14] = [
+    "diffuse",
+    "specular",
+    "normal",
+    "film",
+    "pores",
+    "since",
+    "look",
+    "tiles",
+    "efflorescence",
+    "tide",
+    "dust",
+    "mud",
+    "snow",
+    "heaps",
+];
 
 /// The largest state that is read: some ten million particles.
 const MAX_STATE_BYTES: u64 = 2 << 30;
@@ -142,6 +157,17 @@ fn write_files(scene: &SavedScene, folder: &Path) -> Result<(), SaveError> {
             put("efflorescence", bits(&|marks| marks.efflorescence))?;
             put("tide", bits(&|marks| marks.tide))?;
         }
+        if state.matter {
+            let words = |of: &dyn Fn(&TexelMatter) -> u32| {
+                surface.matter.texels().iter().flat_map(|texel| of(texel).to_le_bytes()).collect::<Vec<u8>>()
+            };
+            put("dust", words(&|texel| texel.dust))?;
+            put("mud", words(&|texel| texel.mud))?;
+            put("snow", words(&|texel| texel.snow))?;
+            let path = file(folder, &state.name, "heaps");
+            let flags = surface.matter.tile_flags().iter().flat_map(|&flags| [flags, u8::MAX]).collect();
+            write_picture(&path, &square::<LumaA<u8>>(&path, size / TILE_SIZE, flags)?, ImageFormat::Png)?;
+        }
     }
     let path = folder.join(STATE);
     let text = ron::ser::to_string_pretty(&scene.state, ron::ser::PrettyConfig::default().depth_limit(3))
@@ -229,7 +255,16 @@ fn read_surface(folder: &Path, state: &SurfaceState) -> Result<SavedSurface, Sav
         state.ledger,
         state.rained_at,
     );
-    Ok(SavedSurface { water, colors })
+    let mut matter = SurfaceMatter::default();
+    if state.matter {
+        let (dust, mud, snow) = (words("dust")?, words("mud")?, words("snow")?);
+        let rows = dust.into_iter().zip(mud).zip(snow);
+        let texels = rows.map(|((dust, mud), snow)| TexelMatter { dust, mud, snow }).collect();
+        let bytes = read_png(&file(folder, &state.name, "heaps"), state.size / TILE_SIZE, 2)?;
+        let flags: Vec<u8> = bytes.as_chunks::<2>().0.iter().map(|&[flags, _]| flags).collect();
+        matter = SurfaceMatter::from_saved(state.size, texels, &flags, state.matter_ledger);
+    }
+    Ok(SavedSurface { water, matter, colors })
 }
 
 /// A part of one from its bits; what is no number is nothing.

@@ -27,6 +27,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::clock::WeatheringClock;
 use crate::emitter::{EmissionSeed, Emitter, EmitterState, NewParticles};
+use crate::matter::{MatterLedger, SurfaceMatter, bind_dried};
 use crate::overlay::{SurfaceTotals, SurfaceTraces};
 use crate::particle::{ParticleCounts, Particles, SavedParticle, WaterCounts};
 use crate::scenario::{Digest, LoadedScenario, ScenarioSurface};
@@ -37,7 +38,7 @@ pub use error::SaveError;
 pub use maps::ColorMaps;
 
 /// The version that is written. Others are refused.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// A scene at a moment between two ticks.
 #[derive(Debug, Clone)]
@@ -86,6 +87,9 @@ pub(super) struct SurfaceState {
     pub(super) wet: bool,
     /// There are maps of its marks.
     pub(super) marks: bool,
+    /// There are maps of its dust, mud and snow.
+    pub(super) matter: bool,
+    pub(super) matter_ledger: MatterLedger,
     pub(super) ledger: Ledger,
     pub(super) rained_at: u32,
     pub(super) totals: SurfaceTotals,
@@ -96,6 +100,7 @@ pub(super) struct SurfaceState {
 #[derive(Debug, Clone)]
 pub(super) struct SavedSurface {
     pub(super) water: SurfaceWater,
+    pub(super) matter: SurfaceMatter,
     pub(super) colors: ColorMaps,
 }
 
@@ -129,7 +134,13 @@ impl SavedScene {
         let order = surfaces_in_order(world);
         let (mut states, mut surfaces) = (Vec::new(), Vec::new());
         for ((entity, name), colors) in order.into_iter().zip(colors) {
+            let mut wet = world.query::<(&mut SurfaceWater, &mut SurfaceMatter)>();
+            if let Ok((mut water, mut matter)) = wet.get_mut(world, entity) {
+                // What the next tick would begin with.
+                bind_dried(water.bypass_change_detection(), matter.bypass_change_detection());
+            }
             let Some(water) = world.get::<SurfaceWater>(entity) else { continue };
+            let matter = world.get::<SurfaceMatter>(entity).cloned().unwrap_or_default();
             let of = |entity: Entity| world.get::<SurfaceTotals>(entity).copied().unwrap_or_default();
             states.push(SurfaceState {
                 name,
@@ -137,12 +148,14 @@ impl SavedScene {
                 shift: water.units().shift,
                 wet: water.is_wet(),
                 marks: !water.marks().is_empty(),
+                matter: !matter.is_empty(),
+                matter_ledger: matter.ledger(),
                 ledger: water.ledger(),
                 rained_at: water.rained_at,
                 totals: of(entity),
                 traces: world.get::<SurfaceTraces>(entity).copied().unwrap_or_default(),
             });
-            surfaces.push(SavedSurface { water: water.clone(), colors });
+            surfaces.push(SavedSurface { water: water.clone(), matter, colors });
         }
         let clock = *world.resource::<WeatheringClock>();
         let new = world.resource::<NewParticles>();

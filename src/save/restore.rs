@@ -10,6 +10,7 @@ use super::{SaveError, SavedScene, emitters_in_order, surfaces_in_order};
 use crate::clock::WeatheringClock;
 use crate::effect::EffectTable;
 use crate::emitter::{EmissionSeed, EmitterState, NewParticles};
+use crate::matter::SurfaceMatter;
 use crate::overlay::{CpuMaps, Overlays, SurfaceTotals, SurfaceTraces, Weatherable};
 use crate::particle::Particles;
 use crate::scenario::{Digest, LoadedScenario, check_weather};
@@ -115,7 +116,10 @@ impl SavedScene {
             *traces = state.traces;
         }
         if let Some(mut water) = world.get_mut::<SurfaceWater>(entity) {
-            *water = SurfaceWater { wrap: water.wrap, ..saved.water.clone() };
+            *water = SurfaceWater { wrap: water.wrap, notes_dried: state.matter, ..saved.water.clone() };
+        }
+        if let Some(mut matter) = world.get_mut::<SurfaceMatter>(entity) {
+            *matter = saved.matter.clone();
         }
         if let Some(mut overlays) = world.get::<Overlays>(entity).cloned() {
             let mut images = world.resource_mut::<Assets<Image>>();

@@ -6,6 +6,7 @@ use bevy::prelude::*;
 use super::ScenarioSurface;
 use crate::clock::WeatheringClock;
 use crate::collision::Impacts;
+use crate::matter::SurfaceMatter;
 use crate::wetting::SurfaceWater;
 
 /// Hash over all impacts so far: tick, particle, surface, triangle, uv, water. Needs no renderer.
@@ -21,14 +22,18 @@ impl Digest {
     }
 }
 
-/// Hash over the impacts and over the water of all surfaces, in the order of the scenario: the same with and without a
+/// Hash over the impacts and over the water and the matter of all surfaces, in the order of the scenario: the same with and without a
 /// renderer.
-pub fn amounts_digest<'a>(impacts: &Digest, surfaces: impl IntoIterator<Item = &'a SurfaceWater>) -> String {
+pub fn amounts_digest<'a>(
+    impacts: &Digest,
+    surfaces: impl IntoIterator<Item = (&'a SurfaceWater, &'a SurfaceMatter)>,
+) -> String {
     let mut hasher = blake3::Hasher::new();
     hasher.update(&impacts.0);
-    for water in surfaces {
+    for (water, matter) in surfaces {
         hasher.update(bytemuck::cast_slice(water.texels()));
         hasher.update(bytemuck::cast_slice(water.marks()));
+        hasher.update(bytemuck::cast_slice(matter.texels()));
     }
     hasher.finalize().to_hex().to_string()
 }

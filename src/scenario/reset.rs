@@ -5,6 +5,7 @@ use bevy::prelude::*;
 use super::Digest;
 use crate::clock::WeatheringClock;
 use crate::emitter::{Emitter, EmitterState, NewParticles};
+use crate::matter::{FallingSnow, MatterQueue, SurfaceMatter};
 use crate::overlay::{CpuMaps, SplatQueue, SurfaceTotals, SurfaceTraces, Weatherable};
 use crate::particle::{ParticleCounts, Particles, Splashes, WaterCounts};
 use crate::weather::DryingClock;
@@ -26,8 +27,16 @@ pub fn reset_scenario(world: &mut World) {
         Option<&mut CpuMaps>,
         Option<&mut SurfaceWater>,
         Option<&mut DropQueue>,
+        Option<(&mut SurfaceMatter, &mut MatterQueue, &mut FallingSnow)>,
     )>();
-    for (mut surface, mut queue, mut totals, mut traces, maps, water, drops) in surfaces.iter_mut(world) {
+    for (mut surface, mut queue, mut totals, mut traces, maps, water, drops, matter) in
+        surfaces.iter_mut(world)
+    {
+        if let Some((mut matter, mut deposits, mut falling)) = matter {
+            matter.reset();
+            deposits.0.clear();
+            falling.0.clear();
+        }
         if let Some(mut water) = water {
             water.reset();
         }
@@ -122,7 +131,7 @@ mod tests {
         app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
         let traces = traces(app);
         let world = app.world_mut();
-        let mut waters = world.query::<&SurfaceWater>();
+        let mut waters = world.query::<(&SurfaceWater, &SurfaceMatter)>();
         let digest = amounts_digest(world.resource::<Digest>(), waters.iter(world));
         (digest, *world.resource::<ParticleCounts>(), traces)
     }
@@ -138,7 +147,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut app = app(folder.path());
         let first = run(&mut app);
-        assert!(first.1.hit > 20 && first.2 == SurfaceTraces { water: true, paint: true }, "{first:?}");
+        assert!(
+            first.1.hit > 20 && first.2 == SurfaceTraces { water: true, paint: true, matter: false },
+            "{first:?}"
+        );
         reset_scenario(app.world_mut());
         // A frame without a tick, in which everybody sees that it is clean again.
         app.update();

@@ -231,6 +231,12 @@ impl LoadedScenario {
         self.resolve(&format!("{field}.effect"), &emitter.effect)?;
         self.not_negative(&format!("{field}.rate"), emitter.rate, Scenario::MAX_RATE)?;
         self.not_negative(&format!("{field}.speed"), emitter.initial_speed(), 1000.0)?;
+        let hose =
+            matches!((emitter.flow, emitter.shape), (Flow::LitresPerMinute(_), EmitterShape::Cone { .. }));
+        if emitter.speed.is_none() && !hose && !matches!(emitter.shape, EmitterShape::Sky { .. }) {
+            let expected = "given, but for a Sky, or a Cone with LitresPerMinute".to_owned();
+            return Err(self.value(format!("{field}.speed"), "not given", expected));
+        }
         match emitter.flow {
             Flow::Effect => {}
             Flow::MmPerHour(rate) => self.positive(&format!("{field}.flow"), rate, 10_000.0)?,

@@ -4,11 +4,12 @@ use bevy::math::Affine3A;
 use bevy::prelude::*;
 
 use super::geometry::{Link, Side};
-use super::{TexelGeometry, WetGeometry};
+use super::{Dripping, SurfaceWater, TexelGeometry, WetGeometry};
 use crate::clock::WeatheringClock;
 use crate::collision::{MeshTriangles, SurfaceCollider};
-use crate::effect::{EffectIndex, EffectTable, WeatherEffect};
+use crate::effect::{Carries, EffectIndex, ParticleLook, Sprite, WeatherEffect};
 use crate::emitter::NewParticles;
+use crate::matter::FallingSnow;
 use crate::particle::{Lifespan, Particle};
 
 /// A drop that is about to fall.
@@ -31,13 +32,13 @@ pub enum DripSite {
     Overhang,
 }
 
-/// The effect whose particles drips are.
+/// The effects whose particles drips are, and snow that falls off an edge.
 #[derive(Resource, Debug, Clone, Default)]
 pub struct DripEffect {
-    /// Its asset; changed, it is another drip's from then on.
-    pub handle: Handle<WeatherEffect>,
-    /// Its row.
-    pub index: Option<EffectIndex>,
+    /// Their assets; they may be edited.
+    pub handles: [Handle<WeatherEffect>; 2],
+    /// Their rows; none while there is no [`EffectTable`].
+    pub rows: Option<[EffectIndex; 2]>,
 }
 
 /// A drop of 3.6 mm.
@@ -51,64 +52,107 @@ pub fn drip_effect() -> WeatherEffect {
     }
 }
 
+/// A lump of snow.
+pub fn snow_fall_effect() -> WeatherEffect {
+    WeatherEffect {
+        carries: Carries::Snow,
+        volume_mm3: 2000.0,
+        terminal_speed: Some(9.0),
+        stamp_radius: Some(0.03),
+        stamp_radius_jitter: 0.4,
+        look: ParticleLook {
+            color: [0.92, 0.94, 0.97, 1.0],
+            width: 0.02,
+            exposure: 0.0,
+            sprite: Sprite::Clod,
+            splash: 0.0,
+        },
+        ..default()
+    }
+}
+
 /// Metres from the surface at which a drop starts.
 const CLEARANCE: f32 = 0.003;
 /// Seconds a drip may fall.
 const LIFETIME: f32 = 6.0;
 
-/// Hands the drips of this tick to the emitters' queue, surface by surface: they are born in the next tick.
+/// Hands the drips of this tick, and the snow that falls off, to the emitters' queue, surface by surface: they are born in
+/// the next tick.
 pub(super) fn shed_drips(
     clock: Res<WeatheringClock>,
-    mut effect: ResMut<DripEffect>,
-    mut effects: ResMut<EffectTable>,
+    effects: Res<DripEffect>,
     mut new: ResMut<NewParticles>,
     mut order: Local<Vec<Entity>>,
-    mut surfaces: Query<(Entity, &mut super::Dripping, &WetGeometry, &SurfaceCollider, &GlobalTransform)>,
+    mut surfaces: Query<Shedding>,
 ) {
     order.clear();
-    order.extend(surfaces.iter().filter(|(_, drips, ..)| !drips.0.is_empty()).map(|(entity, ..)| entity));
-    if order.is_empty() {
-        return;
-    }
+    let sheds = |(_, drips, snow, ..): &(Entity, &Dripping, &FallingSnow, _, _, _, _)| {
+        !drips.0.is_empty() || !snow.0.is_empty()
+    };
+    order.extend(surfaces.iter().filter(sheds).map(|(entity, ..)| entity));
+    let Some([drop, lump]) = effects.rows else { return };
     order.sort_unstable();
-    let handle = effect.handle.clone();
-    let index = *effect.index.get_or_insert(effects.index_of(&handle).unwrap_or(EffectIndex(0)));
     let ticks_left = (LIFETIME * clock.hz() as f32).min(f32::from(Lifespan::MAX_TICKS)) as u16;
     for &entity in order.iter() {
-        let Ok((_, mut drips, geometry, collider, transform)) = surfaces.get_mut(entity) else { continue };
-        for drip in drips.0.drain(..) {
-            let start = start_of(&drip, &geometry.0, collider.0.triangles(), &transform.affine());
+        let Ok((_, mut drips, mut snow, water, geometry, collider, transform)) = surfaces.get_mut(entity)
+        else {
+            continue;
+        };
+        let mut shed = |site: DripSite, texel: u32, volume_nl: u32, effect: EffectIndex| {
+            let position = start_of(site, texel, &geometry.0, collider.0.triangles(), &transform.affine());
+            let lifespan = Lifespan { ticks_left, born_at: 0 };
+            let velocity = Vec3::ZERO;
             new.push(|sequence| Particle {
-                position: start,
-                velocity: Vec3::ZERO,
-                lifespan: Lifespan { ticks_left, born_at: 0 },
-                volume_nl: drip.water_nl,
+                position,
+                velocity,
+                lifespan,
+                volume_nl,
                 sequence,
-                effect: index,
+                effect,
                 class: 0,
             });
+        };
+        for drip in drips.0.drain(..) {
+            shed(drip.site, drip.texel, drip.water_nl, drop);
+        }
+        for fall in snow.0.drain(..) {
+            let volume_nl = u32::try_from(water.units.whole_nl(u64::from(fall.units))).unwrap_or(u32::MAX);
+            if volume_nl > 0 {
+                shed(fall.site, fall.texel, volume_nl, lump);
+            }
         }
     }
 }
 
+type Shedding = (
+    Entity,
+    &'static mut Dripping,
+    &'static mut FallingSnow,
+    &'static SurfaceWater,
+    &'static WetGeometry,
+    &'static SurfaceCollider,
+    &'static GlobalTransform,
+);
+
 /// Where a drop begins to fall: in front of what is steep, beyond the edge of what is flat, below what overhangs.
 fn start_of(
-    drip: &Drip,
+    site: DripSite,
+    texel: u32,
     geometry: &TexelGeometry,
     triangles: &MeshTriangles,
     world_from_mesh: &Affine3A,
 ) -> Vec3 {
     let at = |texel| geometry.point(texel, triangles, world_from_mesh);
-    let Some((point, normal)) = at(drip.texel) else { return Vec3::ZERO };
+    let Some((point, normal)) = at(texel) else { return Vec3::ZERO };
     let off = normal * CLEARANCE;
-    match drip.site {
-        DripSite::Edge(side) if geometry.facing_up(drip.texel) > 0.5 => {
-            let behind = match geometry.link(drip.texel, side.opposite()) {
+    match site {
+        DripSite::Edge(side) if geometry.facing_up(texel) > 0.5 => {
+            let behind = match geometry.link(texel, side.opposite()) {
                 Link::Texel(behind) => at(behind),
                 Link::Edge => None,
             };
             let out = behind.map_or(Vec3::ZERO, |(behind, _)| (point - behind).normalize_or_zero());
-            point + out * (0.5 * geometry.distance(drip.texel, side) + CLEARANCE) + off
+            point + out * (0.5 * geometry.distance(texel, side) + CLEARANCE) + off
         }
         _ => point + off,
     }

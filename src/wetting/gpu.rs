@@ -20,6 +20,7 @@ use half::f16;
 
 use super::surface::{Tiles, texel_in};
 use super::{Exposure, Marks, SurfaceWater, WetGeometry};
+use crate::matter::{GpuTexelMatter, SurfaceMatter, pack_matter};
 use crate::overlay::{Overlays, TILE_SIZE};
 
 /// A texel as the shader reads it: `TexelWater` in `shaders/common/wet_map.wgsl` has the same fields.
@@ -36,8 +37,8 @@ pub struct GpuTexelWater {
     pub marks: u32,
 }
 
-/// Bytes of a tile.
-const TILE_BYTES: usize = (TILE_SIZE * TILE_SIZE) as usize * size_of::<GpuTexelWater>();
+/// Texels of a tile.
+const TILE_TEXELS: usize = (TILE_SIZE * TILE_SIZE) as usize;
 
 /// Sends changed tiles to the GPU. Does nothing without a render app.
 pub struct WaterUploadPlugin;
@@ -86,6 +87,8 @@ impl UploadStats {
 pub(super) struct PackedTiles {
     tiles: Vec<u32>,
     texels: Vec<GpuTexelWater>,
+    /// Of the same texels; none while no matter has come.
+    matter: Vec<GpuTexelMatter>,
 }
 
 /// Packs what changed, and makes room on the GPU for a surface's first water.
@@ -93,19 +96,28 @@ fn pack_tiles(
     mut commands: Commands,
     mut buffers: ResMut<Assets<ShaderBuffer>>,
     mut surfaces: Query<
-        (Entity, &mut SurfaceWater, &WetGeometry, Option<&Exposure>, &mut Overlays, Option<&mut PackedTiles>),
+        (
+            (Entity, &mut SurfaceWater, &SurfaceMatter, &WetGeometry),
+            (Option<&Exposure>, &mut Overlays, Option<&mut PackedTiles>),
+        ),
         Or<(Changed<SurfaceWater>, Changed<Overlays>)>,
     >,
 ) {
-    for (entity, mut water, geometry, exposure, mut overlays, packed) in &mut surfaces {
+    for ((entity, mut water, matter, geometry), (exposure, mut overlays, packed)) in &mut surfaces {
         if !water.is_wet() || overlays.size != water.size {
             continue;
         }
         let water = water.bypass_change_detection();
-        if !overlays.has_room {
-            let bytes = water.texels.len() * size_of::<GpuTexelWater>();
-            overlays.state = buffers.add(ShaderBuffer::with_size(bytes, RenderAssetUsages::RENDER_WORLD));
+        let lacks_matter = !matter.is_empty() && !overlays.has_matter_room;
+        if !overlays.has_room || lacks_matter {
+            let mut room =
+                |bytes| buffers.add(ShaderBuffer::with_size(bytes, RenderAssetUsages::RENDER_WORLD));
+            overlays.state = room(water.texels.len() * size_of::<GpuTexelWater>());
             overlays.has_room = true;
+            if lacks_matter {
+                overlays.matter = room(water.texels.len() * size_of::<GpuTexelMatter>());
+                overlays.has_matter_room = true;
+            }
             // All that was sent before is gone with the old buffer.
             for tile in 0..water.tiles.flags.len() as u32 {
                 if water.tiles.has(tile, Tiles::WET) {
@@ -127,7 +139,16 @@ fn pack_tiles(
         for &tile in &dirty {
             water.tiles.flags[tile as usize] &= !Tiles::DIRTY;
             target.tiles.push(tile);
-            pack_tile(water, &geometry.0, exposure, tile, &mut target.texels);
+            let shown = |local| {
+                let texel = texel_in(water.size, tile, local);
+                geometry.0.gutter_source(texel).unwrap_or(texel)
+            };
+            let texels = (0..TILE_TEXELS).map(shown);
+            target.texels.extend(texels.clone().map(|texel| pack_texel(water, &geometry.0, exposure, texel)));
+            if overlays.has_matter_room {
+                let units = water.units;
+                target.matter.extend(texels.map(|texel| pack_matter(matter, units, &geometry.0, texel)));
+            }
         }
         dirty.clear();
         water.tiles.dirty = dirty;
@@ -135,20 +156,6 @@ fn pack_tiles(
             commands.entity(entity).insert(fresh);
         }
     }
-}
-
-fn pack_tile(
-    water: &SurfaceWater,
-    geometry: &super::TexelGeometry,
-    exposure: Option<&Exposure>,
-    tile: u32,
-    texels: &mut Vec<GpuTexelWater>,
-) {
-    texels.extend((0..(TILE_SIZE * TILE_SIZE) as usize).map(|local| {
-        let texel = texel_in(water.size, tile, local);
-        let shown = geometry.gutter_source(texel).unwrap_or(texel);
-        pack_texel(water, geometry, exposure, shown)
-    }));
 }
 
 /// A texel as it is drawn.
@@ -185,8 +192,8 @@ struct PendingTiles {
 
 struct Pending {
     buffer: AssetId<ShaderBuffer>,
-    tiles: Vec<u32>,
-    texels: Vec<GpuTexelWater>,
+    matter_buffer: AssetId<ShaderBuffer>,
+    packed: PackedTiles,
 }
 
 /// Moves packed tiles into the render world, each once.
@@ -201,20 +208,19 @@ fn extract_tiles(
         if packed.tiles.is_empty() {
             continue;
         }
-        let buffer = overlays.state.id();
+        let (buffer, matter_buffer) = (overlays.state.id(), overlays.matter.id());
         let waiting = pending.surfaces.entry(entity).or_insert(Pending {
             buffer,
-            tiles: Vec::new(),
-            texels: Vec::new(),
+            matter_buffer,
+            packed: PackedTiles::default(),
         });
         if waiting.buffer != buffer {
             // Meant for maps that are gone.
-            waiting.buffer = buffer;
-            waiting.tiles.clear();
-            waiting.texels.clear();
+            *waiting = Pending { buffer, matter_buffer, packed: PackedTiles::default() };
         }
-        waiting.tiles.append(&mut packed.tiles);
-        waiting.texels.append(&mut packed.texels);
+        waiting.packed.tiles.append(&mut packed.tiles);
+        waiting.packed.texels.append(&mut packed.texels);
+        waiting.packed.matter.append(&mut packed.matter);
     }
     pending.surfaces.retain(|entity, _| main_world.get_entity(*entity).is_ok());
 }
@@ -226,22 +232,35 @@ fn write_tiles(
     queue: Res<RenderQueue>,
     stats: Res<UploadStats>,
 ) {
-    for waiting in pending.surfaces.values_mut().filter(|waiting| !waiting.tiles.is_empty()) {
-        let Some(buffer) = buffers.get(waiting.buffer) else { continue };
-        let bytes: &[u8] = bytemuck::cast_slice(&waiting.texels);
+    for waiting in pending.surfaces.values_mut().filter(|waiting| !waiting.packed.tiles.is_empty()) {
+        let Pending { buffer, matter_buffer, packed } = waiting;
+        let (Some(buffer), Some(matter_buffer)) = (buffers.get(*buffer), buffers.get(*matter_buffer)) else {
+            continue;
+        };
+        let texels: &[u8] = bytemuck::cast_slice(&packed.texels);
+        let matter: &[u8] = bytemuck::cast_slice(&packed.matter);
+        let (texel_bytes, matter_bytes) =
+            (TILE_TEXELS * size_of::<GpuTexelWater>(), TILE_TEXELS * size_of::<GpuTexelMatter>());
         let mut first = 0;
-        while first < waiting.tiles.len() {
+        while first < packed.tiles.len() {
             let mut end = first + 1;
-            while end < waiting.tiles.len() && waiting.tiles[end] == waiting.tiles[end - 1] + 1 {
+            while end < packed.tiles.len() && packed.tiles[end] == packed.tiles[end - 1] + 1 {
                 end += 1;
             }
-            let offset = u64::from(waiting.tiles[first]) * TILE_BYTES as u64;
-            queue.write_buffer(&buffer.buffer, offset, &bytes[first * TILE_BYTES..end * TILE_BYTES]);
-            stats.0[1].fetch_add(1, Ordering::Relaxed);
+            let write = |buffer: &GpuShaderBuffer, bytes: &[u8], tile_bytes: usize| {
+                let offset = u64::from(packed.tiles[first]) * tile_bytes as u64;
+                queue.write_buffer(&buffer.buffer, offset, &bytes[first * tile_bytes..end * tile_bytes]);
+                stats.0[1].fetch_add(1, Ordering::Relaxed);
+            };
+            write(buffer, texels, texel_bytes);
+            if !matter.is_empty() {
+                write(matter_buffer, matter, matter_bytes);
+            }
             first = end;
         }
-        stats.0[0].fetch_add(waiting.tiles.len() as u64, Ordering::Relaxed);
-        waiting.tiles.clear();
-        waiting.texels.clear();
+        stats.0[0].fetch_add(packed.tiles.len() as u64, Ordering::Relaxed);
+        packed.tiles.clear();
+        packed.texels.clear();
+        packed.matter.clear();
     }
 }

@@ -12,7 +12,9 @@
 //! All of this is in the main world, in the tick, with and without a renderer: one owner, whole numbers, no way back from the
 //! GPU to wait for. What is drawn gets the tiles that changed ([`gpu`]).
 //!
-//! Not here: dust, snow and mud; water under the surface of a pool that flows; evaporation that cools.
+//! What it does to dust, mud and snow is told in [`matter`](crate::matter).
+//!
+//! Not here: water under the surface of a pool that flows; evaporation that cools.
 
 mod adjacency;
 mod drip;
@@ -47,7 +49,7 @@ use crate::effect::{EffectTable, WeatherEffect};
 use crate::overlay::Weatherable;
 use crate::schedule::{WeatheringSystems, WeatheringTick};
 
-pub use drip::{Drip, DripEffect, DripSite, drip_effect};
+pub use drip::{Drip, DripEffect, DripSite, drip_effect, snow_fall_effect};
 pub use exposure::{Exposure, ExposureProgress};
 pub use geometry::{Link, Side, TexelGeometry};
 pub use marks::Marks;
@@ -59,7 +61,12 @@ pub use surface::{Ledger, Stock, SurfaceWater};
 pub use texel::{Scale, TexelWater, Units};
 pub use tick::WettingStats;
 
-pub(crate) use surface::Now;
+#[cfg(test)]
+pub(crate) use run_off::{RunScratch, run_off};
+pub(crate) use soak::note_arrival;
+#[cfg(test)]
+pub(crate) use soak::{SoakScratch, soak};
+pub(crate) use surface::{Now, jitter, texel_in};
 
 /// Drips of this tick, of one surface.
 #[derive(Component, Debug, Default)]
@@ -103,13 +110,19 @@ impl Plugin for WettingPlugin {
                     query::watch_wetness.in_set(WeatheringSystems::Flow).after(drip::shed_drips),
                 ),
             );
-        let handle = match app.world_mut().get_resource_mut::<Assets<WeatherEffect>>() {
-            Some(mut effects) => effects.add(drip_effect()),
-            None => Handle::default(),
+        let shed = [drip_effect(), snow_fall_effect()];
+        let handles = match app.world_mut().get_resource_mut::<Assets<WeatherEffect>>() {
+            Some(mut effects) => shed.each_ref().map(|effect| effects.add(effect.clone())),
+            // Two that differ: the table knows effects by their handles.
+            None => [1, 2].map(|number| {
+                let number = 0x7765_6174_6865_7200 + number;
+                Handle::Uuid(bevy::asset::uuid::Uuid::from_u128(number), std::marker::PhantomData)
+            }),
         };
         if let Some(mut table) = app.world_mut().get_resource_mut::<EffectTable>() {
-            let index = table.insert(handle.clone(), drip_effect());
-            app.insert_resource(DripEffect { handle, index });
+            let [drop, lump] = shed;
+            let rows = table.insert(handles[0].clone(), drop).zip(table.insert(handles[1].clone(), lump));
+            app.insert_resource(DripEffect { handles, rows: rows.map(|(drop, lump)| [drop, lump]) });
         }
     }
 }

@@ -10,6 +10,7 @@ use super::{Dripping, DropQueue, Exposure, Now, SurfaceWater, TexelGeometry};
 use crate::clock::WeatheringClock;
 use crate::collision::{MeshBvh, SurfaceCollider};
 use crate::material::PorousMaterial;
+use crate::matter::{FallingSnow, MatterQueue, SurfaceMatter};
 use crate::overlay::{TexelArea, Weatherable, Wrap};
 use crate::weather::DryingClock;
 
@@ -175,5 +176,8 @@ pub(super) fn release_surface(removed: On<Remove, Weatherable>, mut commands: Co
         FormerMaterial,
         DropQueue,
         Dripping,
+        SurfaceMatter,
+        MatterQueue,
+        FallingSnow,
     )>();
 }

@@ -17,6 +17,8 @@
 use super::drip::{Drip, DripSite};
 use super::geometry::{Link, Side};
 use super::surface::{Now, SurfaceWater, Tiles, texel_in};
+use crate::matter::SurfaceMatter;
+use crate::matter::wash::{self, Moved, carry_dust, wash_off};
 use crate::overlay::TILE_SIZE;
 
 /// Steps a second, where there are as many ticks.
@@ -65,6 +67,8 @@ struct Move {
     units: u32,
     /// Both are well inside one tile.
     inside: bool,
+    /// Grains that it can carry, by volume, 1/65,536.
+    load: u16,
 }
 
 impl Default for RunScratch {
@@ -84,6 +88,7 @@ pub(crate) fn run_off(
     now: &Now,
     scratch: &mut RunScratch,
     drips: &mut Vec<Drip>,
+    mut matter: Option<&mut SurfaceMatter>,
 ) -> u32 {
     let stride = stride(now.hz);
     let across = water.size / TILE_SIZE;
@@ -99,7 +104,7 @@ pub(crate) fn run_off(
     for &tile in &due {
         let patience = water.tiles.patience[tile as usize];
         let seconds = (stride << patience) as f32 / now.hz as f32;
-        match step_tile(water, now, tile, seconds, scratch, drips) {
+        match step_tile(water, now, tile, seconds, scratch, drips, matter.as_deref_mut()) {
             None => {
                 water.tiles.flags[tile as usize] &= !Tiles::RUNNING;
                 water.tiles.patience[tile as usize] = 0;
@@ -133,6 +138,7 @@ fn step_tile(
     seconds: f32,
     scratch: &mut RunScratch,
     drips: &mut Vec<Drip>,
+    mut matter: Option<&mut SurfaceMatter>,
 ) -> Option<f32> {
     for local in 0..TILE_TEXELS {
         let texel = texel_in(water.size, tile, local);
@@ -155,13 +161,14 @@ fn step_tile(
         if excess <= 0.0 || now.geometry.area_mm2()[texel as usize] <= 0.0 {
             continue;
         }
-        let donor = Donor { texel, local, tile, film, excess };
+        let dusty = matter.as_deref().is_some_and(|matter| matter.texels()[texel as usize].dust > 0);
+        let donor = Donor { texel, local, tile, film, excess, dusty };
         pool = true;
         let first = moves.len();
         let (site, speed) = give(water, now, &donor, seconds, &scratch.film_mm, &mut moves);
         fastest = fastest.max(speed);
         if let Some(site) = site
-            && shed_drop(water, now, &donor, site, drips)
+            && shed_drop(water, now, &donor, site, drips, matter.as_deref_mut())
         {
             shed = true;
             // What has dripped cannot run, too.
@@ -169,7 +176,7 @@ fn step_tile(
         }
     }
     for step in &moves {
-        carry(water, now, tile, step);
+        carry(water, now, tile, step, matter.as_deref_mut());
     }
     let moved = !moves.is_empty() || shed;
     scratch.moves = moves;
@@ -187,6 +194,8 @@ struct Donor {
     tile: u32,
     film: f32,
     excess: f32,
+    /// There are grains to take along.
+    dusty: bool,
 }
 
 impl Donor {
@@ -219,7 +228,7 @@ fn give(
         donor.local.wrapping_sub(TILE_SIZE as usize),
         donor.local + TILE_SIZE as usize,
     ];
-    let mut out = [(0u32, 0.0f32, false); 4];
+    let mut out = [(0u32, 0.0f32, false, 0u16); 4];
     let (mut site, mut lower, mut fastest) = (None, false, 0.0f32);
     for (number, side) in Side::ALL.into_iter().enumerate() {
         let distance = geometry.distance(donor.texel, side).max(1e-6);
@@ -235,9 +244,12 @@ fn give(
                     continue;
                 }
                 lower = true;
-                let courant = speed(donor.film, drop_mm, distance) * seconds / distance;
+                let sine = (drop_mm * 1.0e-3 / distance).min(1.0);
+                let speed = speed(donor.film, sine);
+                let courant = speed * seconds / distance;
                 fastest = fastest.max(courant.min(0.25 * drop_mm / donor.excess));
-                out[number] = (other, (courant * donor.excess).min(0.25 * drop_mm), inside);
+                let load = if donor.dusty { wash::load(speed, sine) } else { 0 };
+                out[number] = (other, (courant * donor.excess).min(0.25 * drop_mm), inside, load);
             }
             Link::Edge => {
                 let rise = match geometry.link(donor.texel, side.opposite()) {
@@ -250,15 +262,15 @@ fn give(
             }
         }
     }
-    let sum: f32 = out.iter().map(|(_, mm, _)| mm).sum();
+    let sum: f32 = out.iter().map(|(_, mm, ..)| mm).sum();
     let most = 0.9 * donor.excess;
     let scale = if sum > most { most / sum } else { 1.0 };
     let unit_mm = now.scale(water.units, donor.texel).unit_mm as f32;
-    for (to, mm, inside) in out {
+    for (to, mm, inside, load) in out {
         let mm = mm * scale;
         let units = (mm / unit_mm) as u32;
         if mm > LEAST_MM_PER_S * seconds && units > 0 {
-            moves.push(Move { from: donor.texel, to, units, inside });
+            moves.push(Move { from: donor.texel, to, units, inside, load });
         }
     }
     if site.is_none() && !lower && geometry.facing_up(donor.texel) < OVERHANG {
@@ -268,8 +280,7 @@ fn give(
 }
 
 /// Mean speed of a film, m/s: `g h² sin b / (3 nu)`, with nu = 1e-6 m²/s.
-fn speed(film_mm: f32, drop_mm: f32, distance: f32) -> f32 {
-    let sine = (drop_mm * 1.0e-3 / distance).min(1.0);
+fn speed(film_mm: f32, sine: f32) -> f32 {
     let depth = film_mm * 1.0e-3;
     9.81 * depth * depth * sine / 3.0e-6
 }
@@ -299,10 +310,11 @@ fn film_now(water: &SurfaceWater, now: &Now, texel: u32) -> f32 {
 
 /// Moves water. The donor's reference time stays: its film has not run out since then and does not now, so what it loses
 /// can be taken from what it had then. So nothing is rounded while it flows.
-fn carry(water: &mut SurfaceWater, now: &Now, tile: u32, step: &Move) {
-    let &Move { from, to, units, inside } = step;
+fn carry(water: &mut SurfaceWater, now: &Now, tile: u32, step: &Move, matter: Option<&mut SurfaceMatter>) {
+    let &Move { from, to, units, inside, load } = step;
     let room = u32::MAX - water.texels[to as usize].film;
-    let units = units.min(room).min(water.texels[from as usize].film);
+    let before = water.texels[from as usize].film;
+    let units = units.min(room).min(before);
     water.texels[from as usize].film -= units;
     let film = water.texels[to as usize].film;
     let least = LEAST_RETAINED * f64::from(now.material.retained_mm);
@@ -314,6 +326,9 @@ fn carry(water: &mut SurfaceWater, now: &Now, tile: u32, step: &Move) {
         water.settle(now, to);
     }
     water.texels[to as usize].film += units;
+    if let Some(matter) = matter {
+        carry_dust(water, matter, Moved { from, to, units, film: before, load });
+    }
     if inside {
         return;
     }
@@ -345,6 +360,7 @@ fn shed_drop(
     donor: &Donor,
     site: DripSite,
     drips: &mut Vec<Drip>,
+    matter: Option<&mut SurfaceMatter>,
 ) -> bool {
     let unit_mm = now.scale(water.units, donor.texel).unit_mm;
     let excess =
@@ -358,7 +374,11 @@ fn shed_drop(
         return false;
     }
     let units = water.units.from_nl(nl);
+    let before = water.texels[donor.texel as usize].film;
     water.texels[donor.texel as usize].film -= units as u32;
+    if let Some(matter) = matter {
+        wash_off(water, matter, donor.texel, units, before);
+    }
     water.ledger.dripped += units;
     drips.push(Drip { texel: donor.texel, site, water_nl: nl as u32 });
     true

@@ -2,8 +2,12 @@
 
 use super::run_off::LEAST_RETAINED;
 use super::surface::{Now, SurfaceWater, Tiles};
+use crate::matter::SurfaceMatter;
+use crate::matter::snow::rain_on_snow;
+use crate::matter::wash::splash;
 use crate::overlay::Splat;
 use crate::overlay::kernel::{axis_coverage, share};
+use crate::weather::Weather;
 
 /// Water of an impact, not yet on its surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,6 +18,8 @@ pub struct Drop {
     pub radius: [i32; 2],
     /// Nanolitres.
     pub water_nl: u32,
+    /// Speed at which it came, mm/s: what it loosens.
+    pub speed_mm: u32,
 }
 
 /// Buffers that keep their memory from tick to tick.
@@ -24,7 +30,15 @@ pub(crate) struct SoakScratch {
 
 /// Puts a drop on the surface: to each texel its share of the stamp. What would fall beside the surface's islands goes to
 /// the texel that continues it there, across the seam, or to the one that was hit.
-pub(crate) fn soak(water: &mut SurfaceWater, now: &Now, drop: &Drop, scratch: &mut SoakScratch) {
+pub(crate) fn soak(
+    water: &mut SurfaceWater,
+    now: &Now,
+    drop: &Drop,
+    scratch: &mut SoakScratch,
+    mut matter: Option<&mut SurfaceMatter>,
+    weather: &Weather,
+) {
+    let speed = f64::from(drop.speed_mm) * 1.0e-3;
     let stamp = Splat { center: drop.center, radius: drop.radius, ..bytemuck::Zeroable::zeroed() };
     let (size, wrap) = (water.size, water.wrap);
     let axes = [stamp.axis(0, size, wrap), stamp.axis(1, size, wrap)];
@@ -39,21 +53,34 @@ pub(crate) fn soak(water: &mut SurfaceWater, now: &Now, drop: &Drop, scratch: &m
                 continue;
             }
             match now.geometry.stand_in(y * size + x) {
-                Some(texel) => put(water, now, texel, nl),
+                Some(texel) => put(water, now, texel, nl, speed, matter.as_deref_mut(), weather),
                 None => beside += nl,
             }
         }
     }
     if beside > 0 {
-        put(water, now, home, beside);
+        put(water, now, home, beside, speed, matter, weather);
     }
     water.ledger.received += water.units.from_nl(u64::from(drop.water_nl));
     water.rained_at = now.tick;
 }
 
-fn put(water: &mut SurfaceWater, now: &Now, texel: u32, nl: u32) {
-    let tile = water.add(now, texel, water.units.from_nl(u64::from(nl)));
+fn put(
+    water: &mut SurfaceWater,
+    now: &Now,
+    texel: u32,
+    nl: u32,
+    speed: f64,
+    matter: Option<&mut SurfaceMatter>,
+    weather: &Weather,
+) {
+    let units = water.units.from_nl(u64::from(nl));
+    let tile = water.add(now, texel, units);
     note_arrival(water, now, texel, tile);
+    if let Some(matter) = matter {
+        splash(water, matter, now, texel, units, speed);
+        rain_on_snow(water, matter, now, weather, texel, units);
+    }
 }
 
 /// The texel that was hit or, if the middle of the stamp is not on the surface, the one beside it that is.

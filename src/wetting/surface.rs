@@ -26,6 +26,10 @@ pub struct SurfaceWater {
     pub(crate) ledger: Ledger,
     /// Tick of the last water from outside; 0 for none since the rim was measured.
     pub(crate) rained_at: u32,
+    /// Whether matter lies on it that a film binds when it dries up.
+    pub(crate) notes_dried: bool,
+    /// If so: texels whose film has dried up, until [`matter`](crate::matter) takes note.
+    pub(crate) dried: Vec<u32>,
 }
 
 /// What has become of the water of a surface; units.
@@ -171,6 +175,8 @@ impl SurfaceWater {
             tiles: Tiles::default(),
             ledger: Ledger::default(),
             rained_at: 0,
+            notes_dried: false,
+            dried: Vec::new(),
         }
     }
 
@@ -301,6 +307,8 @@ impl SurfaceWater {
         self.tiles = Tiles::default();
         self.ledger = Ledger::default();
         self.rained_at = 0;
+        self.notes_dried = false;
+        self.dried.clear();
     }
 
     /// The tile of a texel.
@@ -322,8 +330,11 @@ impl SurfaceWater {
         }
         let amounts = now.amounts(&scale, texel, water);
         let look = now.look(&amounts, water);
-        let pores_before = scale.amounts(water).pores_mm;
+        let (pores_before, had_film) = (scale.amounts(water).pores_mm, water.film > 0);
         self.ledger.evaporated += scale.commit(water, amounts, look, now.tick, jitter(texel, now.tick));
+        if self.notes_dried && had_film && water.film == 0 {
+            self.dried.push(texel);
+        }
         if let Some(marks) = self.marks.get_mut(texel as usize) {
             let left = amounts.film_mm + amounts.pores_mm;
             marks.grow(now.material, pores_before - left, water.rim);
@@ -376,7 +387,7 @@ impl SurfaceWater {
 }
 
 /// An even number in [0, 1) for a texel at a tick.
-fn jitter(texel: u32, tick: u32) -> f64 {
+pub(crate) fn jitter(texel: u32, tick: u32) -> f64 {
     let hash = (texel.wrapping_mul(0x9e37_79b9) ^ tick).wrapping_mul(0x85eb_ca6b);
     let hash = (hash ^ (hash >> 15)).wrapping_mul(0xc2b2_ae35);
     f64::from(hash ^ (hash >> 16)) / 4_294_967_296.0

@@ -12,8 +12,11 @@ use super::spread::{SpreadScratch, spread};
 use super::{Dripping, DropQueue, Exposure, Now, SurfaceWater, WetGeometry};
 use crate::clock::WeatheringClock;
 use crate::material::PorousMaterial;
+use crate::matter::{
+    FallingSnow, MatterQueue, MatterScratch, SurfaceMatter, advance_matter, deposit, is_at_rest,
+};
 use crate::particle::for_each_chunk;
-use crate::weather::DryingClock;
+use crate::weather::{DryingClock, Weather};
 
 /// What the water has cost so far. Surfaces at rest add nothing.
 #[derive(Resource, Debug, Default)]
@@ -22,6 +25,8 @@ pub struct WettingStats {
     tiles_run: AtomicU64,
     tiles_spread: AtomicU64,
     rims: AtomicU64,
+    deposits: AtomicU64,
+    tiles_matter: AtomicU64,
 }
 
 impl WettingStats {
@@ -40,6 +45,16 @@ impl WettingStats {
         self.tiles_spread.load(Ordering::Relaxed)
     }
 
+    /// Dust, mud and snow put down.
+    pub fn deposits(&self) -> u64 {
+        self.deposits.load(Ordering::Relaxed)
+    }
+
+    /// Steps of tiles whose snow slides or melts.
+    pub fn tiles_matter(&self) -> u64 {
+        self.tiles_matter.load(Ordering::Relaxed)
+    }
+
     /// Surfaces whose rims were measured.
     pub fn rims(&self) -> u64 {
         self.rims.load(Ordering::Relaxed)
@@ -53,12 +68,16 @@ pub(super) struct Scratch {
     run: RunScratch,
     spread: SpreadScratch,
     rim: RimScratch,
+    matter: MatterScratch,
 }
 
 type Surface = (
     &'static mut SurfaceWater,
     &'static mut DropQueue,
     &'static mut Dripping,
+    &'static mut SurfaceMatter,
+    &'static mut MatterQueue,
+    &'static mut FallingSnow,
     &'static WetGeometry,
     Option<&'static Exposure>,
     Option<&'static PorousMaterial>,
@@ -69,37 +88,63 @@ type Surface = (
 pub(super) fn advance_water(
     clock: Res<WeatheringClock>,
     drying: Res<DryingClock>,
+    weather: Res<Weather>,
     stats: Res<WettingStats>,
     scratch: Local<Parallel<Scratch>>,
     mut surfaces: Query<Surface>,
 ) {
-    let is_busy =
-        |(water, drops, ..): &SurfaceItem| !drops.0.is_empty() || !water.is_at_rest() || water.rained_at != 0;
+    let is_busy = |(water, drops, _, matter, deposits, ..): &SurfaceItem| {
+        !drops.0.is_empty()
+            || !deposits.0.is_empty()
+            || !water.is_at_rest()
+            || water.rained_at != 0
+            || !is_at_rest(water, matter, &weather)
+    };
     let busy: Vec<SurfaceItem> = surfaces.iter_mut().filter(is_busy).collect();
     let default = PorousMaterial::default();
-    let advance =
-        |scratch: &mut Scratch,
-         (mut water, mut drops, mut drips, geometry, exposure, material): SurfaceItem| {
-            // Change detection is for those who draw it, and looks at its dirty tiles.
-            let (water, drops) = (&mut *water, drops.bypass_change_detection());
-            let material = material.unwrap_or(&default);
-            let now = Now::new(clock.tick(), clock.hz(), &drying, &geometry.0, exposure, material);
-            if !drops.0.is_empty() {
-                water.wake(material.leaves_marks());
-            }
-            for drop in &drops.0 {
-                soak(water, &now, drop, &mut scratch.soak);
-            }
-            stats.drops.fetch_add(drops.0.len() as u64, Ordering::Relaxed);
-            drops.0.clear();
-            let drips = &mut drips.bypass_change_detection().0;
-            let tiles = run_off(water, &now, &mut scratch.run, drips);
-            stats.tiles_run.fetch_add(u64::from(tiles), Ordering::Relaxed);
-            let tiles = spread(water, &now, &mut scratch.spread);
-            stats.tiles_spread.fetch_add(u64::from(tiles), Ordering::Relaxed);
-            let measured = measure_rims(water, &now, &mut scratch.rim);
-            stats.rims.fetch_add(u64::from(measured), Ordering::Relaxed);
-        };
+    let advance = |scratch: &mut Scratch,
+                   (
+        mut water,
+        mut drops,
+        mut drips,
+        mut matter,
+        mut deposits,
+        mut falling,
+        geometry,
+        exposure,
+        material,
+    ): SurfaceItem| {
+        // Change detection is for those who draw it, and looks at its dirty tiles.
+        let (water, drops) = (&mut *water, drops.bypass_change_detection());
+        let (matter, deposits) = (&mut *matter, deposits.bypass_change_detection());
+        let size = water.size;
+        let material = material.unwrap_or(&default);
+        let now = Now::new(clock.tick(), clock.hz(), &drying, &geometry.0, exposure, material);
+        if !drops.0.is_empty() {
+            water.wake(material.leaves_marks());
+        }
+        // Dust first: what falls on dry ground in a tick is wetted by the drops of that tick, whatever their order.
+        for matter_of_impact in &deposits.0 {
+            deposit(water, matter, &now, &weather, matter_of_impact, &mut scratch.matter);
+        }
+        stats.deposits.fetch_add(deposits.0.len() as u64, Ordering::Relaxed);
+        deposits.0.clear();
+        for drop in &drops.0 {
+            soak(water, &now, drop, &mut scratch.soak, matter.awake(size), &weather);
+        }
+        stats.drops.fetch_add(drops.0.len() as u64, Ordering::Relaxed);
+        drops.0.clear();
+        let drips = &mut drips.bypass_change_detection().0;
+        let tiles = run_off(water, &now, &mut scratch.run, drips, matter.awake(size));
+        stats.tiles_run.fetch_add(u64::from(tiles), Ordering::Relaxed);
+        let tiles = spread(water, &now, &mut scratch.spread);
+        stats.tiles_spread.fetch_add(u64::from(tiles), Ordering::Relaxed);
+        let tiles = advance_matter(water, matter, &now, &weather, &mut scratch.matter);
+        stats.tiles_matter.fetch_add(u64::from(tiles), Ordering::Relaxed);
+        falling.bypass_change_detection().0.append(&mut scratch.matter.falls);
+        let measured = measure_rims(water, &now, &mut scratch.rim);
+        stats.rims.fetch_add(u64::from(measured), Ordering::Relaxed);
+    };
     let scratch = &*scratch;
     for_each_chunk(busy.into_iter(), |item| advance(&mut scratch.borrow_local_mut(), item));
 }

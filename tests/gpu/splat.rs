@@ -120,8 +120,6 @@ fn stamps_that_are_turned_and_stamps_in_space_are_the_same_to_the_bit() {
     let surface = Weatherable { map_size: SIZE, wrap_u: wrap[0], wrap_v: wrap[1], ..default() };
     let triangles = MeshTriangles::from_mesh(&Sphere::new(1.0).mesh().uv(24, 16)).unwrap();
     let frames = SurfaceFrames::new(&triangles, SIZE, wrap);
-    let entity = spawn_surface(&mut app, surface);
-    app.world_mut().entity_mut(entity).insert(frames.clone());
     let mut seed = 77u32;
     let mut next = |below: i32| {
         seed = seed.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
@@ -151,19 +149,28 @@ fn stamps_that_are_turned_and_stamps_in_space_are_the_same_to_the_bit() {
         [splat.axis_s, splat.axis_t, splat.axis_n] = axes.map(packed);
         (splat.origin, splat.reach, splat.in_space) = (at, 2 * radius, 1);
     }
-    let mut reference = CpuMaps::new(&surface);
-    reference.paint(&splats, &atlas, Some(&frames));
-    push(&mut app, entity, &splats);
-    painted(&mut app, splats.len() as u64);
-    let maps = maps_of(&mut app, entity, &surface);
     let differing = |a: &[[u8; 4]], b: &[[u8; 4]]| a.iter().zip(b).filter(|(a, b)| a != b).count();
-    assert_eq!(differing(&maps.diffuse, &reference.diffuse), 0);
-    assert_eq!(differing(&maps.specular, &reference.specular), 0);
-    assert_eq!(differing(&maps.normal, &reference.normal), 0);
-    // The same without those in space is another picture.
-    let mut flat = CpuMaps::new(&surface);
-    flat.paint(&splats, &atlas, None);
-    assert!(differing(&flat.diffuse, &maps.diffuse) > 2000);
+    let mut all = 0;
+    for (in_space, textured) in [(0, false), (0, true), (1, false), (1, true)] {
+        let kind = |splat: &&Splat| splat.in_space == in_space && (splat.stamp > 0) == textured;
+        let splats: Vec<Splat> = splats.iter().filter(kind).copied().collect();
+        let entity = spawn_surface(&mut app, surface);
+        app.world_mut().entity_mut(entity).insert(frames.clone());
+        let mut reference = CpuMaps::new(&surface);
+        reference.paint(&splats, &atlas, Some(&frames));
+        push(&mut app, entity, &splats);
+        all += splats.len() as u64;
+        painted(&mut app, all);
+        let maps = maps_of(&mut app, entity, &surface);
+        let differ = [
+            differing(&maps.diffuse, &reference.diffuse),
+            differing(&maps.specular, &reference.specular),
+            differing(&maps.normal, &reference.normal),
+        ];
+        assert_eq!(differ, [0; 3], "in space {in_space}, textured {textured}");
+        let empty = CpuMaps::new(&surface);
+        assert!(differing(&empty.diffuse, &maps.diffuse) > 2000, "in space {in_space}, textured {textured}");
+    }
 }
 
 #[test]

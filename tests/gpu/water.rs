@@ -96,7 +96,12 @@ impl Scene {
 
     fn pour(&mut self, texel: [i32; 2], radius: i32, water_nl: u32) {
         let mut drops = self.app.world_mut().get_mut::<DropQueue>(self.surface).unwrap();
-        drops.0.push(Drop { center: texel.map(|at| at * 256 + 128), radius: [radius * 256; 2], water_nl });
+        drops.0.push(Drop {
+            center: texel.map(|at| at * 256 + 128),
+            radius: [radius * 256; 2],
+            water_nl,
+            speed_mm: 0,
+        });
     }
 
     fn seconds(&self) -> f64 {

@@ -6,6 +6,7 @@ use bevy::prelude::*;
 use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat, TextureUsages};
 use bevy::render::storage::ShaderBuffer;
 
+use crate::matter::GpuTexelMatter;
 use crate::overlay::{RainRing, TILE_SIZE, Weatherable, Wrap};
 use crate::wetting::gpu::GpuTexelWater;
 
@@ -27,6 +28,10 @@ pub struct Overlays {
     pub state: Handle<ShaderBuffer>,
     /// `state` has room for all texels.
     pub has_room: bool,
+    /// [`GpuTexelMatter`] of each texel, tile by tile; a single one while nothing of it has come.
+    pub matter: Handle<ShaderBuffer>,
+    /// `matter` has room for all texels.
+    pub has_matter_room: bool,
     /// [`RainRing::PER_TILE`] [`RainRing`]s of each tile, row by row.
     pub rings: Handle<ShaderBuffer>,
 }
@@ -40,9 +45,21 @@ impl Overlays {
         // wgpu zeroes what is created without data.
         let mut buffer = |bytes| buffers.add(ShaderBuffer::with_size(bytes, RenderAssetUsages::RENDER_WORLD));
         let state = buffer(size_of::<GpuTexelWater>());
+        let matter = buffer(size_of::<GpuTexelMatter>());
         let tiles = (size / TILE_SIZE).pow(2);
         let rings = buffer((tiles * RainRing::PER_TILE) as usize * size_of::<RainRing>());
-        Self { size, wrap: surface.wrap(), diffuse, specular, normal, state, has_room: false, rings }
+        Self {
+            size,
+            wrap: surface.wrap(),
+            diffuse,
+            specular,
+            normal,
+            state,
+            has_room: false,
+            matter,
+            has_matter_room: false,
+            rings,
+        }
     }
 }
 

@@ -310,6 +310,8 @@ mod tests {
             normal: default(),
             state: default(),
             has_room: false,
+            matter: default(),
+            has_matter_room: false,
             rings: default(),
         };
         let surface = main.spawn((overlays, SplatQueue::default())).id();
