@@ -54,6 +54,8 @@ pub struct Impact {
     pub uv_per_metre: Vec2,
     /// Unit directions on the surface in which u and v grow; world space, 0 where they do not.
     pub along: [Vec3; 2],
+    /// It was hit from behind.
+    pub back: bool,
     /// Velocity at the impact, m/s.
     pub velocity: Vec3,
     /// What hit.

@@ -52,6 +52,8 @@ pub struct SceneHit {
     pub uv_per_metre: Vec2,
     /// Unit directions on the surface in which u and v grow; world space, 0 where they do not.
     pub along: [Vec3; 2],
+    /// It was hit from behind: where its corners go round clockwise.
+    pub back: bool,
 }
 
 impl CollisionScene {
@@ -202,15 +204,19 @@ impl Instance {
         let (weight_b, weight_c) = (weight_b.clamp(0.0, 1.0), weight_c.clamp(0.0, 1.0));
         let facing = cross.normalize_or(Vec3::Y);
         let (uv_per_metre, along) = uv_directions([ab, ac], [uv_b - uv_a, uv_c - uv_a]);
+        // A mirror turns the winding round, but not the side that is the front.
+        let behind = facing.dot(end - start) > 0.0;
+        let mirrored = self.world_from_mesh.matrix3.determinant() < 0.0;
         SceneHit {
             surface: self.surface,
             fraction: hit.fraction,
             triangle: triangles.source[index],
             point,
-            normal: if facing.dot(end - start) > 0.0 { -facing } else { facing },
+            normal: if behind { -facing } else { facing },
             uv: uv_a + (uv_b - uv_a) * weight_b + (uv_c - uv_a) * weight_c,
             uv_per_metre,
             along,
+            back: behind != mirrored,
         }
     }
 }

@@ -53,6 +53,7 @@ pub fn trace_particles(
                 uv: hit.uv,
                 uv_per_metre: hit.uv_per_metre,
                 along: hit.along,
+                back: hit.back,
                 velocity,
                 effect: effects[index],
                 class: classes[index],

@@ -104,6 +104,8 @@ impl WeatherEffect {
             DropSizes::Same(mm) => within("drops", mm, 0.001, 100.0, "0.001 to 100 mm")?,
             DropSizes::MarshallPalmer(rate) => within("drops", rate, 0.1, 300.0, "0.1 to 300 mm/h")?,
         }
+        zero_to("flutter", self.flutter, 10.0, "0 to 10 m/s")?;
+        zero_to("splash", self.splash, 0.5, "0 to 0.5")?;
         within("gravity_scale", self.gravity_scale, -10.0, 10.0, "-10 to 10")?;
         within("stamp_radius", self.stamp_radius.unwrap_or(1.0), 1.0e-6, 100.0, "0.000001 to 100 m")?;
         zero_to("stamp_stretch", self.stamp_stretch, 7.0, "0 to 7")?;

@@ -34,6 +34,11 @@ pub struct WeatherEffect {
     pub drops: DropSizes,
     /// Speed at which drag balances gravity, in m/s; 0 switches drag (and wind) off. Not given: that of its drops.
     pub terminal_speed: Option<f32>,
+    /// How fast it is swayed to and fro in still air, m/s; 0..=10. Flakes flutter. Needs drag.
+    pub flutter: f32,
+    /// Part of its water that an impact throws up again as two drops, 0..=0.5, if its drops are so large and fast that they
+    /// splash ([`splashes`](drops::splashes)).
+    pub splash: f32,
     /// Multiplies gravity: 1 falls, 0 floats.
     pub gravity_scale: f32,
     /// Shapes of the mark on the surface.
@@ -148,6 +153,8 @@ impl Default for WeatherEffect {
             carries: Carries::Water,
             drops: DropSizes::default(),
             terminal_speed: None,
+            flutter: 0.0,
+            splash: 0.0,
             gravity_scale: 1.0,
             stamps: StampSource::default(),
             stamp_radius: None,

@@ -4,12 +4,15 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::frames::{FramesWork, SurfaceFrames, measure_frames, release_frames};
-use super::stamping::{Site, splat_from_impact};
+use super::stamping::{Site, splat_from_impact, unit_hash};
 use super::{Splat, StampAtlas, StampSpace, TexelArea, Weatherable};
 use crate::clock::WeatheringClock;
-use crate::collision::{Impacts, SurfaceCollider};
-use crate::effect::{Carries, EffectTable, RefreshEffects};
+use crate::collision::{Impact, Impacts, SurfaceCollider};
+use crate::effect::drops::splashes;
+use crate::effect::{Carries, EffectRow, EffectTable, RefreshEffects, WeatherEffect};
+use crate::emitter::NewParticles;
 use crate::matter::{Deposit, MatterKind, MatterQueue, SurfaceMatter};
+use crate::particle::{Lifespan, Particle, ParticleConfig, Particles};
 use crate::schedule::{WeatheringSystems, WeatheringTick};
 use crate::wetting::{Drop, DropQueue, MeasureSurfaces, SurfaceWater};
 
@@ -153,8 +156,12 @@ pub fn deposit_splats(
     clock: Res<WeatheringClock>,
     impacts: Res<Impacts>,
     effects: Res<EffectTable>,
+    config: Res<ParticleConfig>,
+    particles: Res<Particles>,
+    mut new: ResMut<NewParticles>,
     mut surfaces: Query<Stamped>,
 ) {
+    let room = config.max_alive as usize - particles.len().min(config.max_alive as usize);
     for impact in &impacts.0 {
         let Ok((surface, mut queue, mut totals, drops, matter, frames, transform)) =
             surfaces.get_mut(impact.surface)
@@ -165,6 +172,7 @@ pub fn deposit_splats(
         let Some(effect) = &row.effect else { continue };
         totals.impacts += 1;
         let (water_nl, solid_nl) = effect.carries.parts_nl(impact.volume_nl);
+        let water_nl = water_nl - throw_up(impact, row, effect, water_nl, &clock, room, &mut new);
         totals.water_nl += u64::from(water_nl);
         let site = frames
             .zip(transform)
@@ -187,6 +195,49 @@ pub fn deposit_splats(
         }
     }
 }
+
+/// Throws a part of an impact's water up again, as two drops that are born in the next tick; returns how much, nanolitres.
+fn throw_up(
+    impact: &Impact,
+    row: &EffectRow,
+    effect: &WeatherEffect,
+    water_nl: u32,
+    clock: &WeatheringClock,
+    room: usize,
+    new: &mut NewParticles,
+) -> u32 {
+    let speed = impact.velocity.dot(impact.normal).abs();
+    let thrown_nl = (f64::from(water_nl) * f64::from(effect.splash)) as u32;
+    let diameter = row.diameters_mm[usize::from(impact.class)];
+    if thrown_nl < 2 || new.waiting().len() + 2 > room || !splashes(diameter, speed) {
+        return 0;
+    }
+    let ticks_left = (SPLASH_SECONDS * clock.hz() as f32).ceil() as u16;
+    for (number, volume_nl) in [thrown_nl / 2, thrown_nl - thrown_nl / 2].into_iter().enumerate() {
+        let random =
+            |salt: u32| unit_hash(impact.sequence.0 ^ (salt + 3 * number as u32).wrapping_mul(0x9e37_79b9));
+        let (sin, cos) = (std::f32::consts::TAU * random(0)).sin_cos();
+        let first = impact.normal.any_orthonormal_vector();
+        let sideways = first * cos + impact.normal.cross(first) * sin;
+        // A crown: slower than what hit, and more sideways than up.
+        let velocity = (impact.normal * (0.1 + 0.15 * random(1)) + sideways * (0.1 + 0.2 * random(2)))
+            * speed
+            + impact.velocity.reject_from(impact.normal) * 0.3;
+        new.push(|sequence| Particle {
+            position: impact.point + impact.normal * 2.0e-3,
+            velocity,
+            lifespan: Lifespan { ticks_left, born_at: 0 },
+            volume_nl,
+            sequence,
+            effect: impact.effect,
+            class: impact.class,
+        });
+    }
+    thrown_nl
+}
+
+/// Seconds that what is thrown up may fly.
+const SPLASH_SECONDS: f32 = 2.0;
 
 fn kind_of(carries: Carries) -> Option<MatterKind> {
     match carries {
@@ -212,8 +263,7 @@ pub(crate) fn number_stamps(mut effects: ResMut<EffectTable>, mut atlas: ResMut<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::collision::Impact;
-    use crate::effect::{EffectIndex, WeatherEffect};
+    use crate::effect::EffectIndex;
     use crate::particle::Sequence;
 
     fn impact(surface: Entity, number: u32) -> Impact {
@@ -226,6 +276,7 @@ mod tests {
             uv: Vec2::new(0.5, 1.25),
             uv_per_metre: Vec2::new(0.5, 0.25),
             along: [Vec3::X, Vec3::Z],
+            back: false,
             velocity: Vec3::NEG_Y,
             effect: EffectIndex(0),
             class: 0,
@@ -242,6 +293,9 @@ mod tests {
         let mut effects = EffectTable::default();
         effects.insert(Handle::default(), WeatherEffect { stamp_radius: Some(0.125), ..default() });
         world.insert_resource(effects);
+        world.init_resource::<ParticleConfig>();
+        world.init_resource::<Particles>();
+        world.init_resource::<NewParticles>();
         let mut spawn =
             || world.spawn((Weatherable::default(), SplatQueue::default(), SurfaceTotals::default())).id();
         let (one, other) = (spawn(), spawn());
@@ -264,5 +318,26 @@ mod tests {
         assert_eq!(splat.center, [256 * 256, 128 * 256]);
         assert_eq!(splat.radius, [32 * 256, 16 * 256]);
         assert_eq!((splat.water_nl, splat.tick), (4189, 1));
+    }
+
+    #[test]
+    fn what_splashes_throws_up_a_part_and_not_a_nanolitre_is_lost() {
+        let mut effects = EffectTable::default();
+        effects.insert(Handle::default(), WeatherEffect { splash: 0.3, ..default() });
+        let (row, clock) = (&effects.rows()[0], WeatheringClock::new(60));
+        let effect = row.effect.as_ref().unwrap();
+        let thrown = |velocity: Vec3, room: usize| {
+            let (mut new, hit) =
+                (NewParticles::default(), Impact { velocity, ..impact(Entity::PLACEHOLDER, 4) });
+            let thrown = throw_up(&hit, row, effect, 4189, &clock, room, &mut new);
+            let flying: u32 = new.waiting().iter().map(|particle| particle.volume_nl).sum();
+            assert_eq!(thrown, flying);
+            assert!(new.waiting().iter().all(|particle| particle.velocity.y > 0.0));
+            (thrown, new.waiting().len())
+        };
+        assert_eq!(thrown(Vec3::NEG_Y * 8.0, 10), (1256, 2));
+        // Too slow, as what has been thrown up is; and where there is no room.
+        assert_eq!(thrown(Vec3::NEG_Y * 2.0, 10), (0, 0));
+        assert_eq!(thrown(Vec3::NEG_Y * 8.0, 1), (0, 0));
     }
 }

@@ -88,8 +88,8 @@ pub(super) fn splat_from_impact(
         stamp,
         ..Zeroable::zeroed()
     };
-    // The side of the triangle that was hit may be its back; the map lies on its front.
-    let front = impact.normal * impact.along[0].cross(impact.along[1]).dot(impact.normal).signum();
+    // The map lies on the front.
+    let front = if impact.back { -impact.normal } else { impact.normal };
     let axes = Axes::new(impact, effect.stamp_turn, front);
     let flight = impact.velocity.reject_from(front).normalize_or_zero();
     // Across the flight it is narrower than along it.
@@ -138,6 +138,11 @@ fn hash(number: u32) -> u32 {
     (word >> 22) ^ word
 }
 
+/// An even number in [0, 1).
+pub(super) fn unit_hash(number: u32) -> f32 {
+    (hash(number) >> 8) as f32 / (1u32 << 24) as f32
+}
+
 /// An even number in [-1, 1).
 fn signed_hash(number: u32) -> f32 {
     hash(number) as f32 / (1u32 << 31) as f32 - 1.0
@@ -162,6 +167,7 @@ mod tests {
             uv: Vec2::new(0.75, 0.375),
             uv_per_metre: Vec2::splat(0.5),
             along: [Vec3::X, Vec3::Z],
+            back: false,
             velocity,
             effect: EffectIndex(0),
             class: 0,
@@ -226,6 +232,7 @@ mod tests {
         let site = Site { frames: &frames, world_from_mesh };
         let splat = splat(&hit, WeatherEffect { stamp_turn: StampTurn::Flight, ..paint(0.5) }, Some(&site));
         assert_eq!(splat.in_space, 1);
+        assert_eq!(splat.axis_n, frames.texels[0].normal);
         // Half a metre is a quarter in the mesh, an eighth of its width, and twice that is its reach.
         assert!((splat.reach - 65_536 / 4).abs() < 20, "{}", splat.reach);
         let away = |mesh: Vec3| {

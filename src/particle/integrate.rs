@@ -2,10 +2,10 @@
 
 use bevy::prelude::*;
 
-use super::{Forces, Particles, chunk_len, for_each_chunk};
+use super::{Forces, Particles, Sequence, chunk_len, for_each_chunk};
 use crate::clock::WeatheringClock;
-use crate::effect::EffectTable;
 use crate::effect::drops::SIZE_CLASSES;
+use crate::effect::{EffectTable, WeatherEffect};
 use crate::weather::Weather;
 
 /// Numbers of an effect that motion needs: a scratch row of [`integrate_particles`].
@@ -15,12 +15,23 @@ pub struct Motion {
     gravity: Vec3,
     /// Quadratic drag over mass, 1/m: g / v_terminal².
     drag: f32,
+    /// Speed of the air that sways it, m/s.
+    flutter: f32,
 }
 
 impl Motion {
-    fn new(forces: &Forces, gravity_scale: f32, terminal_speed: f32) -> Self {
+    fn new(forces: &Forces, effect: &WeatherEffect, terminal_speed: f32) -> Self {
         let drag = if terminal_speed > 0.0 { STANDARD_GRAVITY / terminal_speed.powi(2) } else { 0.0 };
-        Self { gravity: forces.gravity * gravity_scale, drag }
+        Self { gravity: forces.gravity * effect.gravity_scale, drag, flutter: effect.flutter }
+    }
+
+    /// The air that sways a particle, beside the wind: round and round, each in its own way.
+    fn sway(&self, sequence: Sequence, seconds: f32) -> Vec3 {
+        let hash = sequence.0.wrapping_mul(0x9e37_79b9);
+        let (phase, turns) = ((hash >> 16) as f32 / 65_536.0, 0.6 + 0.8 * (hash & 0xffff) as f32 / 65_536.0);
+        let handed = if hash & 0x8000 == 0 { 1.0 } else { -1.0 };
+        let (sin, cos) = (std::f32::consts::TAU * (phase + turns * seconds)).sin_cos();
+        Vec3::new(cos, 0.0, handed * sin) * self.flutter
     }
 
     /// Velocity after `dt` seconds.
@@ -50,24 +61,30 @@ pub fn integrate_particles(
 ) {
     motions.clear();
     motions.extend(effects.rows().iter().map(|row| match &row.effect {
-        Some(effect) => {
-            std::array::from_fn(|class| Motion::new(&forces, effect.gravity_scale, row.terminal_speed(class)))
-        }
+        Some(effect) => std::array::from_fn(|class| Motion::new(&forces, effect, row.terminal_speed(class))),
         None => [Motion::default(); SIZE_CLASSES],
     }));
     let (motions, wind, tick) = (motions.as_slice(), weather.wind, clock.delta_secs());
-    let Particles { positions, velocities, lifespans, effects, classes, .. } =
+    // Wraps after some hours, while an `f32` still knows hundredths.
+    let seconds = (clock.tick() % (8192 * clock.hz())) as f32 / clock.hz() as f32;
+    let Particles { positions, velocities, lifespans, effects, classes, sequences, .. } =
         particles.bypass_change_detection();
     let len = chunk_len(positions.len(), PARALLEL_BATCH);
     let columns = positions.chunks_mut(len).zip(velocities.chunks_mut(len));
-    let columns = columns.zip(lifespans.chunks_mut(len)).zip(effects.chunks(len)).zip(classes.chunks(len));
-    for_each_chunk(columns, |((((positions, velocities), lifespans), effects), classes)| {
-        let rows = positions.iter_mut().zip(velocities).zip(lifespans).zip(effects).zip(classes);
-        for ((((position, velocity), lifespan), effect), &class) in rows {
+    let columns = columns
+        .zip(lifespans.chunks_mut(len))
+        .zip(effects.chunks(len))
+        .zip(classes.chunks(len))
+        .zip(sequences.chunks(len));
+    for_each_chunk(columns, |(((((positions, velocities), lifespans), effects), classes), sequences)| {
+        let rows =
+            positions.iter_mut().zip(velocities).zip(lifespans).zip(effects).zip(classes).zip(sequences);
+        for (((((position, velocity), lifespan), effect), &class), &sequence) in rows {
             lifespan.ticks_left = lifespan.ticks_left.saturating_sub(1);
             let dt = tick * lifespan.moving_part();
-            *velocity =
-                motions[usize::from(effect.0)][usize::from(class) % SIZE_CLASSES].step(*velocity, wind, dt);
+            let motion = &motions[usize::from(effect.0)][usize::from(class) % SIZE_CLASSES];
+            let air = if motion.flutter > 0.0 { wind + motion.sway(sequence, seconds) } else { wind };
+            *velocity = motion.step(*velocity, air, dt);
             *position += *velocity * dt;
         }
     });
@@ -75,9 +92,9 @@ pub fn integrate_particles(
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Lifespan, Particle, Sequence};
+    use super::super::{Lifespan, Particle};
     use super::*;
-    use crate::effect::{EffectIndex, WeatherEffect};
+    use crate::effect::EffectIndex;
 
     fn world_with(effect: WeatherEffect, forces: Forces) -> (World, EffectIndex) {
         let mut world = World::new();
@@ -141,6 +158,23 @@ mod tests {
         run(&mut world, 120);
         let velocity = velocity(&world);
         assert!(velocity.x > 29.0 && velocity.x <= 30.0, "{velocity}");
+    }
+
+    #[test]
+    fn flakes_are_swayed_round_where_they_fall() {
+        let effect = WeatherEffect { terminal_speed: Some(1.0), flutter: 0.4, ..default() };
+        let (mut world, index) = world_with(effect, Forces::default());
+        spawn(&mut world, Vec3::NEG_Y, index, 0);
+        let (mut fastest, mut farthest) = (0.0f32, 0.0f32);
+        for _ in 0..600 {
+            world.resource_mut::<WeatheringClock>().advance();
+            run(&mut world, 1);
+            let at = world.resource::<Particles>().positions()[0];
+            farthest = farthest.max(at.with_y(0.0).length());
+            fastest = fastest.max(velocity(&world).with_y(0.0).length());
+        }
+        assert!((0.2..0.45).contains(&fastest) && (0.02..0.5).contains(&farthest), "{fastest} {farthest}");
+        assert!((velocity(&world).y + 1.0).abs() < 0.2, "{}", velocity(&world));
     }
 
     #[test]

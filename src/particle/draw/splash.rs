@@ -184,6 +184,7 @@ mod tests {
             uv: Vec2::ZERO,
             uv_per_metre: Vec2::ONE,
             along: [Vec3::X, Vec3::Z],
+            back: false,
             class: 0,
             velocity,
             effect,
