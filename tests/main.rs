@@ -34,12 +34,16 @@ mod gpu {
 }
 /// Structs that Rust and WGSL share.
 mod layout;
+/// Dust, mud and snow.
+mod matter;
 /// The program as its users run it: output, errors, exit codes.
 mod replay;
 /// Scenes that are saved and gone on with, and accounts of all water.
 mod save;
 /// What the parts are together: order, independence of a renderer.
 mod schedule;
+/// Marks across the borders of uv islands.
+mod seams;
 /// The smaller tools of the program.
 mod tools;
 /// Wet maps, made as their users make them.

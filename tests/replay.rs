@@ -234,7 +234,9 @@ fn another_seed_is_another_run() {
     assert_eq!(other["seed"], 12345);
     assert_ne!(own["seed"], other["seed"]);
     assert_ne!(own["digest"], other["digest"]);
-    assert_eq!(own["particles"]["emitted"], other["particles"]["emitted"]);
+    // The hose sends out the same number; how many drops splash up depends on where they hit.
+    let born = [&own, &other].map(|report| number(&report["particles"]["emitted"]));
+    assert!(born.iter().all(|born| (500.0..800.0).contains(born)), "{born:?}");
 }
 
 #[test]

@@ -101,18 +101,28 @@ impl Frames {
             all.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &at| (low.min(at), high.max(at)));
         let extent = (high - low).max_element();
         let step = if extent.is_finite() && extent > 0.0 { extent / 65_535.0 } else { 1.0 };
-        let directions: Vec<[Vec3; 2]> =
-            (0..triangles.positions.len()).map(|index| directions(triangles, index)).collect();
+        let slopes: Vec<[Vec3; 2]> =
+            (0..triangles.positions.len()).map(|index| derivatives(triangles, index)).collect();
+        let frame = |at: Vec3, normal: Vec3, [along_u, along_v]: [Vec3; 2]| {
+            let place = ((at - low) / step).round().as_ivec3().to_array();
+            TexelFrame::new(place, normal, along_u.normalize_or_zero(), along_v.normalize_or_zero())
+        };
+        let points = surface_points(triangles, &Affine3A::IDENTITY, size, wrap);
         let mut texels = vec![TexelFrame::default(); (size * size) as usize];
-        for point in surface_points(triangles, &Affine3A::IDENTITY, size, wrap) {
-            let at = ((point.position - low) / step).round().as_ivec3().to_array();
-            let [along_u, along_v] = directions[point.triangle as usize];
-            texels[point.texel as usize] = TexelFrame::new(at, point.normal, along_u, along_v);
+        for point in &points {
+            let texel = frame(point.position, point.normal, slopes[point.triangle as usize]);
+            texels[point.texel as usize] = texel;
         }
+        // The gutter goes on straight where the island ends, so that what lies between it and the gutter is right.
+        let side = size as i32;
+        let offset = |from: u32, to: u32| (to as i32 - from as i32 + side / 2).rem_euclid(side) - side / 2;
         for texel in 0..size * size {
-            if let Some(source) = geometry.gutter_source(texel) {
-                texels[texel as usize] = texels[source as usize];
-            }
+            let Some(source) = geometry.gutter_source(texel) else { continue };
+            let Ok(index) = points.binary_search_by_key(&source, |point| point.texel) else { continue };
+            let (point, [per_u, per_v]) = (points[index], slopes[points[index].triangle as usize]);
+            let (columns, rows) = (offset(source % size, texel % size), offset(source / size, texel / size));
+            let away = (per_u * columns as f32 + per_v * rows as f32) / size as f32;
+            texels[texel as usize] = frame(point.position + away, point.normal, [per_u, per_v]);
         }
         let (tiles, boxes) = tile_boxes(&texels, size);
         Self { texels, low, step, boxes: BoxOverlaps::build(&boxes), tiles }
@@ -135,14 +145,13 @@ impl Frames {
     }
 }
 
-/// Unit directions in which u and v grow on a triangle; zero where they do not.
-fn directions(triangles: &MeshTriangles, index: usize) -> [Vec3; 2] {
+/// How a place on a triangle changes with u and v, in units of the mesh; zero where it does not.
+fn derivatives(triangles: &MeshTriangles, index: usize) -> [Vec3; 2] {
     let ([a, b, c], [uv_a, uv_b, uv_c]) = (triangles.positions[index], triangles.uvs[index]);
     let ((ab, ac), (uv_ab, uv_ac)) = ((b - a, c - a), (uv_b - uv_a, uv_c - uv_a));
-    let facing = uv_ab.perp_dot(uv_ac).signum();
-    let along_u = (ab * uv_ac.y - ac * uv_ab.y) * facing;
-    let along_v = (ac * uv_ab.x - ab * uv_ac.x) * facing;
-    [along_u.normalize_or_zero(), along_v.normalize_or_zero()]
+    let area = uv_ab.perp_dot(uv_ac);
+    let sound = |along: Vec3| if along.is_finite() { along } else { Vec3::ZERO };
+    [sound((ab * uv_ac.y - ac * uv_ab.y) / area), sound((ac * uv_ab.x - ab * uv_ac.x) / area)]
 }
 
 /// The tiles on which anything lies, and boxes around that.

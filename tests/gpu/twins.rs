@@ -2,12 +2,13 @@
 
 use bevy_weathering::material::film::{flood, layer, ripples};
 use bevy_weathering::material::models::{authored, film_on_pores, lagarde, lekner_dorf, twomey};
+use bevy_weathering::matter::look as matter;
 use bevy_weathering::wetting::evolve::{Amounts, Matter, evolve};
 use bevy_weathering::wetting::look;
 
 use super::harness;
 
-const SOURCES: [(&str, &str); 10] = [
+const SOURCES: [(&str, &str); 11] = [
     ("hnat.wgsl", include_str!("../../shaders/common/hnat.wgsl")),
     ("lagarde.wgsl", include_str!("../../shaders/common/lagarde.wgsl")),
     ("lekner_dorf.wgsl", include_str!("../../shaders/common/lekner_dorf.wgsl")),
@@ -18,6 +19,7 @@ const SOURCES: [(&str, &str); 10] = [
     ("flood.wgsl", include_str!("../../shaders/common/flood.wgsl")),
     ("ripples.wgsl", include_str!("../../shaders/common/ripples.wgsl")),
     ("drying.wgsl", include_str!("../../shaders/common/drying.wgsl")),
+    ("matter.wgsl", include_str!("../../shaders/common/matter.wgsl")),
 ];
 
 /// Random numbers of one input, each in `[0, 1)`.
@@ -32,6 +34,30 @@ struct Twin {
 }
 
 const TWINS: &[Twin] = &[
+    Twin {
+        wgsl: "matter::matter_cover(0.2 * x[0], 0.01 + 0.1 * x[1])",
+        rust: |x| matter::matter_cover(0.2 * x[0], 0.01 + 0.1 * x[1]),
+    },
+    Twin {
+        wgsl: "matter::dust_color_over(vec3(x[0]), vec3(x[1]), vec3(x[2]), vec2(x[3], x[4]), x[5]).y",
+        rust: |x| matter::dust_color_over(x[0], x[1], x[2], [x[3], x[4]], x[5]),
+    },
+    Twin {
+        wgsl: "matter::snow_albedo(vec3(x[0]), vec3(0.3 + 0.69 * x[1]), 40.0 * x[2]).z",
+        rust: |x| matter::snow_albedo(x[0], 0.3 + 0.69 * x[1], 40.0 * x[2]),
+    },
+    Twin {
+        wgsl: "matter::roughness_under(x[0], x[1], x[2])",
+        rust: |x| matter::roughness_under(x[0], x[1], x[2]),
+    },
+    Twin {
+        wgsl: "matter::settled_soil(x[0], x[1], x[2], x[3] - 0.5).x",
+        rust: |x| matter::settled_soil(x[0], x[1], x[2], x[3] - 0.5)[0],
+    },
+    Twin {
+        wgsl: "matter::settled_soil(x[0], x[1], x[2], x[3] - 0.5).y",
+        rust: |x| matter::settled_soil(x[0], x[1], x[2], x[3] - 0.5)[1],
+    },
     Twin { wgsl: "lagarde::kept_albedo(x[0], x[1])", rust: |x| lagarde::kept_albedo(x[0], x[1]) },
     Twin {
         wgsl: "lagarde::wet_albedo(vec3(x[0]), x[1], x[2]).y",

@@ -1,6 +1,6 @@
 //! Water in and on surfaces, in whole apps without a renderer: arrival, run-off, drips, drying, queries, accounts.
 
-mod scene;
+pub mod scene;
 
 use bevy::prelude::*;
 use bevy_weathering::clock::WeatheringClock;
