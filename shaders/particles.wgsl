@@ -314,6 +314,9 @@ fn through_ball(N: vec3<f32>, V: vec3<f32>) -> vec3<f32> {
     return select(normalize(out), inside, dot(out, out) < 1e-6);
 }
 
+// How white falling water is for its bubbles and for drops too small to be drawn.
+const SPRAY: f32 = 0.9;
+
 // Water shows what is behind it upside down, mirrors a little of what is before it, and throws sunlight ahead.
 fn water_color(color: vec3<f32>, shade: f32, N: vec3<f32>, V: vec3<f32>, light: Sun, position: vec3<f32>) -> vec3<f32> {
     let around = surroundings(N, through_ball(N, V), position);
@@ -321,7 +324,8 @@ fn water_color(color: vec3<f32>, shade: f32, N: vec3<f32>, V: vec3<f32>, light: 
     let refracted = color * mix(around.radiance, around.diffuse, fresnel);
     let ahead = color * scattered(dot(-light.L, V), 0.75);
     let glint = WATER_REFLECTANCE * highlight(N, V, light.L, 150.0);
-    return 2.0 * shade * (refracted + ahead * light.irradiance) + glint * light.irradiance;
+    let spray = SPRAY * color * (around.diffuse + wrapped(dot(N, light.L), 1.0) * light.irradiance);
+    return 2.0 * shade * (refracted + ahead * light.irradiance) + spray + glint * light.irradiance;
 }
 
 // Ice is bright from all sides, brightest against the light, and flashes when a face mirrors the sun.

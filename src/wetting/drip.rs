@@ -37,7 +37,7 @@ pub enum DripSite {
 pub struct DripEffect {
     /// Their assets; they may be edited.
     pub handles: [Handle<WeatherEffect>; 2],
-    /// Their rows; none while there is no [`EffectTable`].
+    /// Their rows; none while there is no [`EffectTable`](crate::effect::EffectTable).
     pub rows: Option<[EffectIndex; 2]>,
 }
 

@@ -159,7 +159,7 @@ fn triangle(corners: [u32; 3], positions: &[Vec3]) -> Option<(RtTriangle, Aabb)>
     let prepared = RtTriangle::from(&triangle);
     let twice_area_squared = prepared.ng.length_squared();
     // Written so that NaN fails.
-    let can_be_hit = twice_area_squared >= f32::MIN_POSITIVE && twice_area_squared < f32::INFINITY;
+    let can_be_hit = (f32::MIN_POSITIVE..f32::INFINITY).contains(&twice_area_squared);
     can_be_hit.then(|| (prepared, triangle.aabb()))
 }
 
