@@ -33,4 +33,8 @@ picture regions 1024x576 00005 regions
 picture bas_relief 640x480 00001 bas_relief_dry 00008 bas_relief_rain 00039 bas_relief_wet
 picture drying 640x480 00003 drying_wet 00016 drying_half 00034 drying_late
 picture roof_edge 640x480 00030 roof_edge
+picture rain 640x480 00010 rain
+picture dust 640x480 00013 dust
+picture snow 640x480 00015 snow
+picture mud 640x480 00003 mud
 picture stair 640x480 00020 stair_rain 00050 stair_puddles

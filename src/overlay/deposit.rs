@@ -336,8 +336,8 @@ mod tests {
             (thrown, new.waiting().len())
         };
         assert_eq!(thrown(Vec3::NEG_Y * 8.0, 10), (1256, 2));
-        // Too slow, as what has been thrown up is; and where there is no room.
-        assert_eq!(thrown(Vec3::NEG_Y * 2.0, 10), (0, 0));
+        // Too slow, as what has been thrown up twice is; and where there is no room.
+        assert_eq!(thrown(Vec3::NEG_Y * 8.0 * 0.35 * 0.35, 10), (0, 0));
         assert_eq!(thrown(Vec3::NEG_Y * 8.0, 1), (0, 0));
     }
 }
