@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
+use bevy_weathering::prelude::WeatherEffect;
 use image::RgbImage;
 
 fn weathering(folder: &Path, arguments: &str) -> Output {
@@ -58,5 +59,33 @@ fn wet_textures_refuse_nonsense_and_write_nothing() {
         assert_eq!(output.status.code(), Some(2), "{arguments}: {message}");
         assert!(message.contains(named) && !message.contains("panicked"), "{arguments}: {message}");
         assert!(!folder.path().join("out").exists(), "{arguments}");
+    }
+}
+
+#[test]
+fn stamps_are_written_as_strips_and_an_effect_can_use_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = weathering(folder.path(), "stamps --out marks --kind splat --variants 3 --size 32");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let mut files = std::collections::BTreeMap::new();
+    for map in ["diffuse", "specular", "normal"] {
+        let name = format!("splat_{map}.png");
+        let bytes = std::fs::read(folder.path().join("marks").join(&name)).unwrap();
+        let strip = image::load_from_memory(&bytes).unwrap().to_rgba8();
+        assert_eq!(strip.dimensions(), (96, 32));
+        assert!(strip.pixels().any(|pixel| pixel.0[3] > 200) && strip.get_pixel(0, 0).0[3] == 0, "{map}");
+        files.insert(name, bytes);
+    }
+    let effect = r#"(stamps: Images(
+        diffuse: "splat_diffuse.png", specular: "splat_specular.png", normal: "splat_normal.png", variants: 3,
+    ))"#;
+    let effect = WeatherEffect::from_ron(effect.as_bytes()).unwrap();
+    assert_eq!(effect.stamps.read(&files).unwrap().unwrap().variants.len(), 3);
+    for (arguments, named) in [("--size 33", "size"), ("--variants 0", "variants"), ("--kind glass", "glass")] {
+        let output = weathering(folder.path(), &format!("stamps --out none {arguments}"));
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {message}");
+        assert!(message.contains(named) && !message.contains("panicked"), "{arguments}: {message}");
+        assert!(!folder.path().join("none").exists(), "{arguments}");
     }
 }

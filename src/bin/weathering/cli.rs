@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::stamps::StampsArgs;
 use crate::wetmap::WetMapCommand;
 use bevy::math::UVec2;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -23,6 +24,8 @@ pub enum Command {
     /// Make a wet map: what of a surface gets wet first
     #[command(subcommand)]
     Wetmap(WetMapCommand),
+    /// Make stamps: the marks that impacts leave, as textures
+    Stamps(StampsArgs),
     /// Make a wet version of a base colour texture
     WetTexture(WetTextureArgs),
 }

@@ -3,6 +3,7 @@
 mod cli;
 mod replay;
 mod sandbox;
+mod stamps;
 mod wet_texture;
 mod wetmap;
 
@@ -15,6 +16,7 @@ fn main() -> ExitCode {
         cli::Command::Replay(arguments) => replay::run(&arguments),
         cli::Command::Sandbox(arguments) => sandbox::run(&arguments),
         cli::Command::Wetmap(command) => wetmap::run(&command),
+        cli::Command::Stamps(arguments) => stamps::run(&arguments),
         cli::Command::WetTexture(arguments) => wet_texture::run(&arguments),
     };
     match result {
