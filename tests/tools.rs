@@ -81,7 +81,8 @@ fn stamps_are_written_as_strips_and_an_effect_can_use_them() {
     ))"#;
     let effect = WeatherEffect::from_ron(effect.as_bytes()).unwrap();
     assert_eq!(effect.stamps.read(&files).unwrap().unwrap().variants.len(), 3);
-    for (arguments, named) in [("--size 33", "size"), ("--variants 0", "variants"), ("--kind glass", "glass")] {
+    for (arguments, named) in [("--size 33", "size"), ("--variants 0", "variants"), ("--kind glass", "glass")]
+    {
         let output = weathering(folder.path(), &format!("stamps --out none {arguments}"));
         let message = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{arguments}: {message}");
