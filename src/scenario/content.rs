@@ -203,6 +203,7 @@ fn generate(mesh: &MeshSpec) -> Option<Result<Mesh, MeshError>> {
             Some(meshes::stair(width, steps, rise, going, hollow, cells, seed))
         }
         MeshSpec::Roof { size, pitch_deg, tiles, cells } => Some(meshes::roof(size, pitch_deg, tiles, cells)),
+        MeshSpec::Car { length, cells } => Some(meshes::car(length, cells)),
         MeshSpec::File(_) => None,
     }
 }

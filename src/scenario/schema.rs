@@ -443,6 +443,13 @@ pub enum MeshSpec {
         /// Across a tile and along it.
         cells: u32,
     },
+    /// The body of a small car, its nose towards +x.
+    Car {
+        /// Metres.
+        length: f32,
+        /// Quads across its width, at least 4.
+        cells: u32,
+    },
     /// The first mesh of a `.glb` or `.gltf`.
     File(String),
 }

@@ -214,6 +214,10 @@ impl LoadedScenario {
                 let rows = u64::from(tiles.y) * (u64::from(*cells) + 1);
                 product([4, u64::from(tiles.x), u64::from(*cells) + 4, rows + 4])
             }
+            MeshSpec::Car { length, cells } => {
+                self.positive(&format!("{field}.mesh.length"), *length, FAR)?;
+                product([28, u64::from(*cells), u64::from(*cells), 1])
+            }
             MeshSpec::Vase { height, segments, rings } | MeshSpec::Flowerpot { height, segments, rings } => {
                 self.positive(&format!("{field}.mesh.height"), *height, FAR)?;
                 u64::from(*segments) * u64::from(*rings) * 2

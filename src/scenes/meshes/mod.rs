@@ -8,6 +8,7 @@
 //! | `relief` | [`bas_relief`], a plate with what `carving` designs |
 //! | `stair` | [`stair`], a flight of worn steps |
 //! | `roof` | [`roof`], a slope of tiles |
+//! | `car` | [`car`](fn@car), the body of a hatchback |
 //!
 //! Every mesh is an indexed triangle list with positions, unit normals, UVs and tangents, wound
 //! counter-clockwise as seen from outside. A closed surface is cut open along one meridian: the vertices of
@@ -17,6 +18,7 @@
 //! What noise shapes takes a seed, and is the same on every run.
 
 mod ball;
+mod car;
 mod carving;
 #[cfg(test)]
 mod checks;
@@ -29,6 +31,7 @@ mod roof;
 mod stair;
 
 pub use ball::{rock, uv_sphere};
+pub use car::car;
 pub use flat::{cloth, ground, road};
 pub use lathe::{flowerpot, vase};
 pub use relief::bas_relief;
