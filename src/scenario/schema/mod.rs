@@ -1,0 +1,197 @@
+//! What a scenario file may say. Every struct refuses fields it does not know.
+
+mod emitter;
+mod surface;
+
+use std::collections::BTreeMap;
+
+use bevy::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::weather::Weather;
+
+pub use emitter::{EmitterKey, EmitterSpec};
+pub use surface::{MaterialSpec, MeshSpec, SurfaceSpec, SurfaceTextureSpec, TextureSpec, WetMapSpec};
+
+/// A scene and what happens in it. Lengths in metres, angles in degrees, time in seconds.
+#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// Seeds everything random.
+    #[serde(default)]
+    pub seed: u64,
+    /// Ticks per second, 1..=1000.
+    #[serde(default = "default_hz")]
+    pub tick_hz: u32,
+    /// Length, up to [`Self::MAX_SECONDS`].
+    pub seconds: f32,
+    /// m/s².
+    #[serde(default = "default_gravity")]
+    pub gravity: Vec3,
+    /// m/s.
+    #[serde(default)]
+    pub wind: Vec3,
+    /// What dries. The wind is `wind`, the direction of the sun that of `sun`.
+    #[serde(default)]
+    pub weather: WeatherSpec,
+    /// The most particles in flight, up to [`Self::MAX_PARTICLES`].
+    #[serde(default = "default_max_particles")]
+    pub max_particles: u32,
+    /// Where it is seen from.
+    pub camera: CameraSpec,
+    /// The one light with shadows.
+    #[serde(default)]
+    pub sun: SunSpec,
+    /// What is all around.
+    #[serde(default)]
+    pub environment: Option<EnvironmentSpec>,
+    /// Materials by name.
+    pub materials: BTreeMap<String, MaterialSpec>,
+    /// What can get wet, at most [`Self::MAX_SURFACES`].
+    pub surfaces: Vec<SurfaceSpec>,
+    /// What makes it wet, at most [`Self::MAX_EMITTERS`].
+    #[serde(default)]
+    pub emitters: Vec<EmitterSpec>,
+}
+
+impl Scenario {
+    /// The longest run: a day.
+    pub const MAX_SECONDS: f32 = 86_400.0;
+    /// The most particles in flight.
+    pub const MAX_PARTICLES: u32 = 10_000_000;
+    /// The most surfaces.
+    pub const MAX_SURFACES: usize = 10_000;
+    /// The most emitters.
+    pub const MAX_EMITTERS: usize = 4096;
+    /// The most particles an emitter sends per second.
+    pub const MAX_RATE: f32 = 10_000_000.0;
+    /// The most triangles of a generated mesh.
+    pub const MAX_TRIANGLES: u64 = 20_000_000;
+}
+
+fn default_hz() -> u32 {
+    crate::clock::WeatheringClock::DEFAULT_HZ
+}
+
+fn default_gravity() -> Vec3 {
+    crate::particle::Forces::default().gravity
+}
+
+fn default_max_particles() -> u32 {
+    crate::particle::ParticleConfig::default().max_alive
+}
+
+/// A camera that moves along its keys.
+#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct CameraSpec {
+    /// Vertical field of view.
+    #[serde(default = "default_fov")]
+    pub fov_deg: f32,
+    /// Exposure value at ISO 100: 15 in bright sun, 12 overcast, 7 indoors.
+    #[serde(default = "default_ev100")]
+    pub ev100: f32,
+    /// In order of time; one is enough. Smooth in between.
+    pub keys: Vec<CameraKey>,
+}
+
+fn default_fov() -> f32 {
+    40.0
+}
+
+fn default_ev100() -> f32 {
+    12.0
+}
+
+/// Where the camera is at a time.
+#[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct CameraKey {
+    /// Seconds.
+    #[serde(default)]
+    pub t: f32,
+    /// Position of the eye.
+    pub eye: Vec3,
+    /// What it looks at.
+    pub target: Vec3,
+}
+
+/// The sun.
+#[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct SunSpec {
+    /// Where it shines to.
+    pub direction: Vec3,
+    /// Lux.
+    pub illuminance: f32,
+    /// Linear RGB.
+    pub color: [f32; 3],
+    /// Casts shadows.
+    pub shadows: bool,
+}
+
+impl Default for SunSpec {
+    fn default() -> Self {
+        Self {
+            direction: Vec3::new(-0.5, -1.0, -0.4),
+            illuminance: 10_000.0,
+            color: [1.0, 0.95, 0.88],
+            shadows: true,
+        }
+    }
+}
+
+/// What the weather takes; see [`Weather`].
+#[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct WeatherSpec {
+    /// °C, -40..=60.
+    pub temperature_c: f32,
+    /// Relative, 0..=1.
+    pub humidity: f32,
+    /// W/m², 0..=1400.
+    pub sun_w_per_m2: f32,
+    /// How many times faster things dry than in the world, 0..=100,000.
+    pub drying_speed: f32,
+}
+
+impl Default for WeatherSpec {
+    fn default() -> Self {
+        let Weather { temperature_c, humidity, sun_w_per_m2, drying_speed, .. } = Weather::default();
+        Self { temperature_c, humidity, sun_w_per_m2, drying_speed }
+    }
+}
+
+impl Scenario {
+    /// The weather of the run.
+    pub fn weather(&self) -> Weather {
+        let WeatherSpec { temperature_c, humidity, sun_w_per_m2, drying_speed } = self.weather;
+        let (wind, sun_direction) = (self.wind, self.sun.direction);
+        Weather { temperature_c, humidity, wind, sun_direction, sun_w_per_m2, drying_speed }
+    }
+}
+
+/// A photograph of everything around.
+#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct EnvironmentSpec {
+    /// Equirectangular `.exr`.
+    pub map: String,
+    /// cd/m² of a texel of value 1.
+    #[serde(default = "default_intensity")]
+    pub intensity: f32,
+    /// Turns the map around the vertical axis.
+    #[serde(default)]
+    pub turn_deg: f32,
+    /// Shows it behind the scene.
+    #[serde(default = "default_true")]
+    pub skybox: bool,
+}
+
+fn default_intensity() -> f32 {
+    3_000.0
+}
+
+fn default_true() -> bool {
+    true
+}
