@@ -32,8 +32,10 @@ pub fn trace_particles(
         return;
     }
     let tick = clock.delta_secs();
+    let particles = particles.bypass_change_detection();
+    let newborn = particles.newborn_from();
     let Particles { positions, velocities, lifespans, volumes_nl, sequences, effects, classes, .. } =
-        particles.bypass_change_detection();
+        particles;
     let len = chunk_len(positions.len(), PARALLEL_BATCH);
     let chunks = lifespans.chunks_mut(len).enumerate();
     let (scene, per_thread_found) = (&*scene, &*per_thread);
@@ -41,7 +43,8 @@ pub fn trace_particles(
         let mut found = per_thread_found.borrow_local_mut();
         for (index, lifespan) in (chunk * len..).zip(lifespans) {
             let (end, velocity) = (positions[index], velocities[index]);
-            let start = swept_start(end, velocity, tick * lifespan.moving_part());
+            let seconds = if index < newborn { tick } else { tick * lifespan.moving_part() };
+            let start = swept_start(end, velocity, seconds);
             let Some(hit) = scene.cast(start, end) else { continue };
             lifespan.mark_hit();
             found.push(Impact {

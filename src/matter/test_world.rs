@@ -131,7 +131,7 @@ impl Ground {
             let center = [along(3_242_174_889), along(2_447_445_414)];
             let drop = Drop { center, radius: [384; 2], water_nl: 4189, speed_mm: 6500 };
             let matter = self.matter.awake(place.geometry.size());
-            soak(&mut self.water, &now, &drop, &mut self.soak, matter, &place.weather);
+            soak(&mut self.water, &now, &[drop], &mut self.soak, matter, &place.weather);
         }
     }
 

@@ -2,10 +2,10 @@
 
 use bevy::prelude::*;
 
-use super::{Forces, Particles, Sequence, chunk_len, for_each_chunk};
+use super::{Forces, Lifespan, Particles, Sequence, chunk_len, for_each_chunk};
 use crate::clock::WeatheringClock;
 use crate::effect::drops::SIZE_CLASSES;
-use crate::effect::{EffectTable, WeatherEffect};
+use crate::effect::{EffectIndex, EffectTable, WeatherEffect};
 use crate::weather::Weather;
 
 /// Numbers of an effect that motion needs: a scratch row of [`integrate_particles`].
@@ -67,34 +67,44 @@ pub fn integrate_particles(
     let (motions, wind, tick) = (motions.as_slice(), weather.wind, clock.delta_secs());
     // Wraps after some hours, while an `f32` still knows hundredths.
     let seconds = (clock.tick() % (8192 * clock.hz())) as f32 / clock.hz() as f32;
-    let Particles { positions, velocities, lifespans, effects, classes, sequences, .. } =
-        particles.bypass_change_detection();
+    let particles = particles.bypass_change_detection();
+    let newborn = particles.newborn_from();
+    let Particles { positions, velocities, lifespans, effects, classes, sequences, .. } = particles;
     let len = chunk_len(positions.len(), PARALLEL_BATCH);
-    let columns = positions.chunks_mut(len).zip(velocities.chunks_mut(len));
-    let columns = columns
-        .zip(lifespans.chunks_mut(len))
-        .zip(effects.chunks(len))
-        .zip(classes.chunks(len))
-        .zip(sequences.chunks(len));
-    for_each_chunk(columns, |(((((positions, velocities), lifespans), effects), classes), sequences)| {
-        let rows =
-            positions.iter_mut().zip(velocities).zip(lifespans).zip(effects).zip(classes).zip(sequences);
-        for (((((position, velocity), lifespan), effect), &class), &sequence) in rows {
+    let columns = positions.chunks_mut(len).zip(velocities.chunks_mut(len)).zip(lifespans.chunks_mut(len));
+    let kinds = effects.chunks(len).zip(classes.chunks(len)).zip(sequences.chunks(len));
+    for_each_chunk(columns.zip(kinds).enumerate(), |(chunk, (moving, kinds))| {
+        let ((positions, velocities), lifespans) = moving;
+        let ((effects, classes), sequences) = kinds;
+        let old = newborn.saturating_sub(chunk * len).min(positions.len());
+        let mut kind = (EffectIndex(u16::MAX), u8::MAX);
+        let mut motion = Motion::default();
+        let mut advance = |index: usize, lifespan: &mut Lifespan, dt: f32| {
             lifespan.ticks_left = lifespan.ticks_left.saturating_sub(1);
+            // Neighbours are mostly of one kind.
+            if (effects[index], classes[index]) != kind {
+                kind = (effects[index], classes[index]);
+                motion = motions[usize::from(kind.0.0)][usize::from(kind.1) % SIZE_CLASSES];
+            }
+            let air = if motion.flutter > 0.0 { wind + motion.sway(sequences[index], seconds) } else { wind };
+            velocities[index] = motion.step(velocities[index], air, dt);
+            positions[index] += velocities[index] * dt;
+        };
+        let (grown, born) = lifespans.split_at_mut(old);
+        for (index, lifespan) in grown.iter_mut().enumerate() {
+            advance(index, lifespan, tick);
+        }
+        for (index, lifespan) in (old..).zip(born) {
             let dt = tick * lifespan.moving_part();
-            let motion = &motions[usize::from(effect.0)][usize::from(class) % SIZE_CLASSES];
-            let air = if motion.flutter > 0.0 { wind + motion.sway(sequence, seconds) } else { wind };
-            *velocity = motion.step(*velocity, air, dt);
-            *position += *velocity * dt;
+            advance(index, lifespan, dt);
         }
     });
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Lifespan, Particle};
+    use super::super::Particle;
     use super::*;
-    use crate::effect::EffectIndex;
 
     fn world_with(effect: WeatherEffect, forces: Forces) -> (World, EffectIndex) {
         let mut world = World::new();

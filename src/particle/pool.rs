@@ -132,6 +132,11 @@ impl Particles {
         (self.newborn..self.len()).map(|index| self.row(index))
     }
 
+    /// The index of the first that was born in this tick.
+    pub(crate) fn newborn_from(&self) -> usize {
+        self.newborn
+    }
+
     /// Adds what is born in this tick.
     pub fn spawn(&mut self, born: impl ExactSizeIterator<Item = Particle>) {
         let count = born.len();

@@ -17,6 +17,7 @@
 //! Not here: water under the surface of a pool that flows; evaporation that cools.
 
 mod adjacency;
+mod arrivals;
 mod drip;
 pub mod evolve;
 mod exposure;

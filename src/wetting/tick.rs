@@ -129,9 +129,7 @@ pub(super) fn advance_water(
         }
         stats.deposits.fetch_add(deposits.0.len() as u64, Ordering::Relaxed);
         deposits.0.clear();
-        for drop in &drops.0 {
-            soak(water, &now, drop, &mut scratch.soak, matter.awake(size), &weather);
-        }
+        soak(water, &now, &drops.0, &mut scratch.soak, matter.awake(size), &weather);
         stats.drops.fetch_add(drops.0.len() as u64, Ordering::Relaxed);
         drops.0.clear();
         let drips = &mut drips.bypass_change_detection().0;

@@ -12,6 +12,7 @@ use bevy::light::DirectionalLightShadowMap;
 use bevy::prelude::*;
 use bevy::render::renderer::RenderAdapterInfo;
 use bevy_weathering::WeatheringPlugins;
+use bevy_weathering::effect::WeatherEffect;
 use bevy_weathering::replay::{require_adapter, task_pools};
 use bevy_weathering::scenario::{Scenario, ScenarioPlugin, ScenarioStatus};
 
@@ -34,7 +35,12 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
             DefaultPlugins
                 .set(task_pools(None))
                 .set(WindowPlugin { primary_window: Some(window), ..default() })
-                .set(AssetPlugin { file_path: loaded.tree.to_string_lossy().into_owned(), ..default() }),
+                .set(AssetPlugin {
+                    file_path: loaded.tree.to_string_lossy().into_owned(),
+                    // Effects, stamps and pictures follow their files while one works on them.
+                    watch_for_changes_override: Some(true),
+                    ..default()
+                }),
         )
         .add_plugins(WeatheringPlugins)
         .add_plugins(scenario)
@@ -42,7 +48,7 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
         .insert_resource(title::ScenarioName(arguments.file.display().to_string()))
         .add_plugins((camera::plugin, keys::plugin, title::plugin))
         .add_systems(Startup, spare_software_renderers)
-        .add_systems(Update, quit_on_failure)
+        .add_systems(Update, (quit_on_failure, tell_of_reloads))
         .run();
     if exit.is_error() { Err("the scenario could not be shown; see above".into()) } else { Ok(()) }
 }
@@ -61,6 +67,17 @@ fn spare_software_renderers(
         }
         for mut window in &mut windows {
             window.resolution.set(800.0, 450.0);
+        }
+    }
+}
+
+/// Whoever edits an effect wants to know that it was read again; that it could not be is told by the asset server.
+fn tell_of_reloads(mut events: MessageReader<AssetEvent<WeatherEffect>>, server: Res<AssetServer>) {
+    for event in events.read() {
+        if let AssetEvent::Modified { id } = event
+            && let Some(path) = server.get_path(*id)
+        {
+            info!("read again: {path}");
         }
     }
 }
