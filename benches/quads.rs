@@ -1,7 +1,7 @@
 //! The baseline of [`overlap`](crate::overlap): stamps as quads, blended into render targets.
 //!
 //! What most decal and painting code does. Three maps of `rgba8unorm` are drawn into at once; a quad covers its stamp's
-//! square and no more. An instance is packed into 40 bytes on the CPU and uploaded, in every call; what the library has in
+//! square and no more. An instance is packed into 32 bytes on the CPU and uploaded, in every call; what the library has in
 //! its rows for stamps of the atlas and in space is left out. Order is that of the instances, so the same stamps lie on top;
 //! the hardware rounds in its own way. Stamps end at the edges: wraparound would take up to four quads for one.
 
