@@ -10,6 +10,8 @@
 //! | [`shading`] | a frame full of a weathered surface | the same frame of a `StandardMaterial` |
 //! | [`wetting`] | water that runs, and surfaces at rest | a tick without surfaces |
 //! | [`splat`] | painting on the CPU, and sorting for the GPU | each other |
+//! | [`overlap`] | 100,000 stamps in a frame on the GPU | [`quads`]: instanced, and a draw for each |
+//! | [`drawing`] | a frame with up to 500,000 particles in sight | the same frame without |
 //!
 //! `cargo bench --bench main` runs all of them, `cargo bench --bench main -- cast` one. Results, predictions
 //! and limits are in `benches/NOTES.md`.
@@ -18,11 +20,15 @@
 
 mod bytes;
 mod cast;
+mod drawing;
 mod far;
 mod glb;
+mod headless;
 mod hoff;
 mod live;
 mod measure;
+mod overlap;
+mod quads;
 mod scene;
 mod shading;
 mod sim;
@@ -54,6 +60,6 @@ criterion_group! {
     config = config();
     // Memory first, while nothing has been given back to the allocator that it could hand out again.
     targets = bytes::bench, baseline_is_right, tick::bench, live::bench, far::bench, cast::bench, splat::bench,
-        wetting::bench, shading::bench
+        wetting::bench, shading::bench, overlap::bench, drawing::bench
 }
 criterion_main!(benches);
