@@ -11,7 +11,7 @@
 use bevy::prelude::*;
 use bevy_weathering::collision::MeshTriangles;
 use bevy_weathering::effect::WeatherEffect;
-use bevy_weathering::emitter::{Emitter, EmitterShape};
+use bevy_weathering::emitter::{Emitter, EmitterShape, Flow};
 use bevy_weathering::overlay::{Weatherable, Wrap};
 use bevy_weathering::scenes::meshes;
 
@@ -59,11 +59,15 @@ pub fn water() -> WeatherEffect {
     WeatherEffect::from_ron(include_bytes!("../assets/effects/hose.effect.ron")).expect("the effect is valid")
 }
 
+/// What comes out of the hose, litres a minute: a garden hose. The more particles, the smaller each.
+const HOSE_FLOW: f32 = 20.0;
+
 /// The hose, and where it stands. Sends out nothing at a rate of 0.
 pub fn hose(effect: Handle<WeatherEffect>, rate: f32) -> (Emitter, Transform) {
     let emitter = Emitter {
         effect,
         rate,
+        flow: Flow::LitresPerMinute(HOSE_FLOW),
         shape: EmitterShape::Cone { radius: 0.008 },
         speed: 8.8,
         spread: 4.0_f32.to_radians(),

@@ -43,8 +43,9 @@ pub struct WeatherEffect {
     pub gravity_scale: f32,
     /// Shapes of the mark on the surface.
     pub stamps: StampSource,
-    /// Radius of the mark, in metres. Not given: of a round patch as large as what its drops spread to
-    /// ([`spread_mm`](drops::spread_mm)), all of them together.
+    /// Radius of the mark of a particle with `volume_mm3` or more, in metres; with less it is smaller, by (V/V₀)^(5/12), as drops of
+    /// one speed spread. Not given: of a round patch as large as what its drops spread to ([`spread_mm`](drops::spread_mm)), all
+    /// of them together.
     pub stamp_radius: Option<f32>,
     /// Each stamp's radius is drawn evenly from `stamp_radius` times 1 ± this; 0..=0.9.
     pub stamp_radius_jitter: f32,

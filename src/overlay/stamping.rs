@@ -17,14 +17,21 @@ pub(super) struct Site<'a> {
     pub(super) world_from_mesh: Affine3A,
 }
 
+/// A drop of diameter d spreads to `d We^1/4`; We grows with d, and d with the cube root of the volume.
+const SPREAD_BY_VOLUME: f32 = 5.0 / 12.0;
+
 /// Radius of the mark of an impact, metres, before it is drawn out.
 fn radius(impact: &Impact, effect: &WeatherEffect, row: &EffectRow) -> f32 {
-    let own = effect.stamp_radius.unwrap_or_else(|| {
-        let diameter = row.diameters_mm[usize::from(impact.class)];
-        let drops = (impact.volume_nl as f32 * 1e-3 / drop_mm3(diameter)).max(1.0);
-        let speed = impact.velocity.dot(impact.normal).abs();
-        0.5e-3 * spread_mm(diameter, speed) * drops.sqrt()
-    });
+    let volume_mm3 = impact.volume_nl as f32 * 1e-3;
+    let own = match effect.stamp_radius {
+        Some(radius) => radius * (volume_mm3 / effect.volume_mm3).min(1.0).powf(SPREAD_BY_VOLUME),
+        None => {
+            let diameter = row.diameters_mm[usize::from(impact.class)];
+            let drops = (volume_mm3 / drop_mm3(diameter)).max(1.0);
+            let speed = impact.velocity.dot(impact.normal).abs();
+            0.5e-3 * spread_mm(diameter, speed) * drops.sqrt()
+        }
+    };
     own * (1.0 + effect.stamp_radius_jitter * signed_hash(impact.sequence.0))
 }
 
@@ -192,6 +199,11 @@ mod tests {
     fn marks_are_as_large_as_the_effect_says_or_as_its_drops_spread() {
         let straight = impact(Vec3::NEG_Y * 6.55);
         assert_eq!(splat(&straight, paint(0.25), None).radius, [8 * 256; 2]);
+        // A part of its drops' usual volume leaves a smaller mark, more a mark as ever.
+        let with = |volume_nl: u32| splat(&Impact { volume_nl, ..straight }, paint(0.25), None).radius[0];
+        assert_eq!(with(4189 * 1000), 8 * 256);
+        let part = with(4189 / 8) as f32 / (8.0 * 256.0);
+        assert!((part - 0.5f32.powf(1.25)).abs() < 0.01, "{part}");
         // A drop of 2 mm spreads to 11.8 mm: too small for these texels of 31 mm. Ten thousand of them are not.
         let drops = WeatherEffect { stamp_radius: None, ..paint(1.0) };
         assert_eq!(splat(&straight, drops.clone(), None).radius, [Splat::MIN_RADIUS; 2]);
