@@ -25,9 +25,19 @@ fn particle(number: u32) -> Particle {
 }
 
 /// Resident memory of this process, bytes.
-fn resident() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+pub fn resident() -> Option<u64> {
+    kibibytes("/proc/self/status", "VmRSS:")
+}
+
+/// Memory that this machine can still give, bytes.
+pub fn available() -> Option<u64> {
+    kibibytes("/proc/meminfo", "MemAvailable:")
+}
+
+/// A line of such a file, in bytes.
+fn kibibytes(file: &str, name: &str) -> Option<u64> {
+    let lines = std::fs::read_to_string(file).ok()?;
+    let line = lines.lines().find_map(|line| line.strip_prefix(name))?;
     let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     Some(kibibytes * 1024)
 }

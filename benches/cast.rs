@@ -6,6 +6,9 @@
 //! as make about four million triangle tests; the ratio is per segment. The baseline resolves uvs,
 //! `MeshBvh::cast` only the triangle; with one hit in several segments and one uv per hit that is far below
 //! its scan.
+//!
+//! The bunny and the ground of a million triangles are cast at by [`rivals`], too, with the same segments, all on one core.
+//! Before anything is timed it is made sure that they hit the same, at the same distances.
 
 use std::time::Instant;
 
@@ -13,25 +16,32 @@ use bevy::prelude::*;
 use bevy_weathering::collision::{MeshBvh, MeshTriangles};
 use criterion::{Criterion, Throughput};
 
-use crate::glb;
 use crate::hoff::{HoffParticle, HoffReject, HoffSystem};
 use crate::measure::{self, Contender};
-use crate::scene::Random;
+use crate::rivals::{BareMesh, BevyCaster, BvhCrate, Parry, Welded};
+use crate::scene::{self, Random, dune_height};
+use crate::{glb, rivals};
 
 const SEGMENTS: usize = 4096;
 
 /// m.
-const LENGTH: f32 = 0.13;
+pub const LENGTH: f32 = 0.13;
 
 /// Triangle tests of the baseline per call.
 const BRUTE_TESTS: usize = 4_000_000;
+
+/// Triangle tests of Bevy's brute force per call.
+const BEVY_TESTS: usize = 32_000_000;
+
+/// What the rivals are given.
+const RIVALLED: [&str; 2] = ["bunny", "ground_1m"];
 
 /// A mesh to cast at.
 enum Shape {
     /// A model of the repository.
     Glb(&'static str),
     /// Cells along each side.
-    Ground(u16),
+    Ground(u32),
 }
 
 const SHAPES: [(&str, Shape); 6] = [
@@ -43,38 +53,14 @@ const SHAPES: [(&str, Shape); 6] = [
     ("ground_1m", Shape::Ground(707)),
 ];
 
-/// m; broad dunes with ripples on them.
-fn height(x: f32, z: f32) -> f32 {
-    0.15 * (2.1 * x + 0.3).sin() * (1.7 * z).cos() + 0.03 * (19.0 * x).sin() * (23.0 * z).sin()
-}
-
-fn bumpy_ground(cells: u16) -> MeshTriangles {
-    let mut triangles = MeshTriangles::default();
-    let corner = |column: u16, row: u16| {
-        let uv = Vec2::new(f32::from(column), f32::from(row)) / f32::from(cells);
-        let at = (uv - 0.5) * 6.0;
-        (Vec3::new(at.x, height(at.x, at.y), at.y), uv)
-    };
-    for row in 0..cells {
-        for column in 0..cells {
-            let (a, b) = (corner(column, row), corner(column + 1, row));
-            let (c, d) = (corner(column, row + 1), corner(column + 1, row + 1));
-            for corners in [[a, c, b], [b, c, d]] {
-                triangles.source.push(triangles.positions.len() as u32);
-                triangles.positions.push(corners.map(|(position, _)| position));
-                triangles.uvs.push(corners.map(|(_, uv)| uv));
-            }
-        }
-    }
-    triangles.report.total = triangles.positions.len() as u32;
-    triangles
-}
-
 impl Shape {
     fn triangles(&self) -> MeshTriangles {
         match *self {
             Self::Glb(model) => glb::triangles(model),
-            Self::Ground(cells) => bumpy_ground(cells),
+            Self::Ground(cells) => {
+                let dunes = scene::dunes(Vec2::splat(-3.0), Vec2::splat(6.0), UVec2::splat(cells));
+                MeshTriangles::from_mesh(&dunes).expect("dunes have triangles and uvs")
+            }
         }
     }
 
@@ -89,12 +75,72 @@ impl Shape {
                 Self::Glb(_) => low + (high - low) * (random.vector() * 0.5 + 0.5),
                 Self::Ground(_) => {
                     let at = random.vector() * Vec3::new(3.0, 0.1, 3.0);
-                    at + Vec3::Y * height(at.x, at.z)
+                    at + Vec3::Y * dune_height(at.x, at.z)
                 }
             };
             (start, start + random.vector().normalize_or(Vec3::X) * LENGTH)
         };
         (0..SEGMENTS).map(segment).collect()
+    }
+}
+
+/// Of the closest hit, m.
+fn distance(bvh: &MeshBvh, &(start, end): &(Vec3, Vec3)) -> Option<f32> {
+    bvh.cast(start, end).map(|hit| hit.fraction * LENGTH)
+}
+
+/// How many segments hit.
+fn hits(bvh: &MeshBvh, segments: &[(Vec3, Vec3)]) -> usize {
+    segments.iter().filter(|(start, end)| bvh.cast(*start, *end).is_some()).count()
+}
+
+/// Checks that everybody hits the same, then times them by turns.
+fn against_rivals(name: &str, bvh: &MeshBvh, segments: &[(Vec3, Vec3)]) {
+    let mesh = Welded::new(bvh.triangles());
+    let built = |what: &str, begun: Instant| {
+        println!("cast/{name}: {what} built in {:.1} ms", begun.elapsed().as_secs_f64() * 1e3);
+    };
+    let begun = Instant::now();
+    let parry = Parry::new(&mesh, segments);
+    built("parry3d", begun);
+    let begun = Instant::now();
+    let tree = BvhCrate::new(&mesh, segments);
+    built("bvh", begun);
+    let bare = BareMesh::new(&mesh, segments);
+    let mut bevy = BevyCaster::new(&mesh, segments);
+
+    let expected: Vec<Option<f32>> = segments.iter().map(|segment| distance(bvh, segment)).collect();
+    let few = (BEVY_TESTS / bvh.triangles().positions.len()).clamp(1, SEGMENTS);
+    rivals::check("parry3d", &expected, |number| parry.cast(number));
+    rivals::check("bvh, nearest first", &expected, |number| tree.nearest_first(number));
+    rivals::check("bvh, limited", &expected, |number| tree.limited(number));
+    rivals::check("ray_mesh_intersection", &expected[..few], |number| bare.cast(number));
+    rivals::check("MeshRayCast", &expected[..few], |number| bevy.cast(number));
+
+    let mut trees = [
+        Contender::new("ours", || hits(bvh, segments)),
+        Contender::new("parry3d", || (0..SEGMENTS).filter(|&i| parry.cast(i).is_some()).count()),
+        Contender::new("bvh_nearest_first", || {
+            (0..SEGMENTS).filter(|&i| tree.nearest_first(i).is_some()).count()
+        }),
+        Contender::new("bvh_limited", || (0..SEGMENTS).filter(|&i| tree.limited(i).is_some()).count()),
+    ];
+    let label = format!("cast/{name}, {SEGMENTS} segments");
+    let [ours, others @ ..] = measure::means(&label, "hits", &mut trees, 10, 2);
+    for (other, seconds) in ["parry3d", "bvh nearest first", "bvh limited"].into_iter().zip(others) {
+        println!("cast/{name}: {other} {:.0} ns each", seconds * 1e9 / SEGMENTS as f64);
+        measure::ratio(&format!("cast/{name} against {other}"), ours, seconds);
+    }
+    let mut scans = [
+        Contender::new("ours", || hits(bvh, &segments[..few])),
+        Contender::new("mesh_ray_cast", || (0..few).filter(|&i| bevy.cast(i).is_some()).count()),
+        Contender::new("ray_mesh_intersection", || (0..few).filter(|&i| bare.cast(i).is_some()).count()),
+    ];
+    let label = format!("cast/{name}, {few} segments");
+    let [ours, others @ ..] = measure::means(&label, "hits", &mut scans, 5, 1);
+    for (other, seconds) in ["MeshRayCast", "ray_mesh_intersection"].into_iter().zip(others) {
+        println!("cast/{name}: {other} {:.0} ns each", seconds * 1e9 / few as f64);
+        measure::ratio(&format!("cast/{name} against {other}"), ours, seconds);
     }
 }
 
@@ -117,7 +163,7 @@ pub fn bench(criterion: &mut Criterion) {
         let build = begun.elapsed();
 
         let few = &segments[..(BRUTE_TESTS / count).clamp(1, SEGMENTS)];
-        let cast = || segments.iter().filter(|(start, end)| bvh.cast(*start, *end).is_some()).count();
+        let cast = || hits(&bvh, &segments);
         let scan = || {
             brute.clear();
             // A tick of 1 s at a speed of a segment a second.
@@ -135,6 +181,10 @@ pub fn bench(criterion: &mut Criterion) {
             let label = format!("cast, {SEGMENTS} and {} segments", few.len());
             let [ours, hoff] = measure::means(&label, "hits", &mut contenders, 10, 2);
             results.push((name, count, build, ours / SEGMENTS as f64, hoff / few.len() as f64));
+            drop(contenders);
+            if RIVALLED.contains(&name) {
+                against_rivals(name, &bvh, &segments);
+            }
         }
     }
     group.finish();

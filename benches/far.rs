@@ -32,7 +32,7 @@ fn start(random: &mut Random) -> Vec3 {
 
 /// The library's particles.
 fn ours() -> impl FnMut() -> usize {
-    let mut sim = Sim::new(Setup { rate: 0.0, drag: true, cpu_painter: false });
+    let mut sim = Sim::new(Setup { rate: 0.0, drag: true, ..default() });
     let effect = sim.effect();
     let world = sim.world_mut();
     let mut random = Random::new();

@@ -36,7 +36,7 @@ pub fn bench(_: &mut Criterion) {
     println!("\nlive: one-tick frames of scene 1, budget {:.2} ms", BUDGET.as_secs_f64() * 1e3);
     let mut highest = 0;
     for (number, rate) in RATES.into_iter().enumerate() {
-        let mut sim = Sim::new(Setup { rate: rate as f32, drag: true, cpu_painter: false });
+        let mut sim = Sim::new(Setup { rate: rate as f32, drag: true, ..Setup::default() });
         if number == 0 {
             println!("compute threads: {}", ComputeTaskPool::get().thread_num());
             println!(

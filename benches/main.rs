@@ -1,12 +1,14 @@
-//! Benches: what a tick costs, against the brute force of 2007 and against bare loops.
+//! Benches: what a tick costs, against the brute force of 2007, against other ray casters and against bare loops.
 //!
 //! | group | measures | against |
 //! |---|---|---|
 //! | [`bytes`] | memory of a particle in flight | - |
-//! | [`tick`] | a tick of scene 1 in the steady state | [`hoff`], every particle against every triangle |
+//! | [`tick`] | a tick of scenes 1 and 2 in the steady state, 100 to 1,000 particles/s | [`hoff`], every particle against every triangle |
 //! | [`live`] | the highest emission that leaves a 60 Hz tick inside its 16.67 ms | the budget |
 //! | [`far`] | a particle with nothing near it | a loop over two arrays |
-//! | [`cast`] | closest hits of short segments, from 1,000 to 1,000,000 triangles | [`hoff`] |
+//! | [`cast`] | closest hits of short segments, from 1,000 to 1,000,000 triangles | [`hoff`]; parry3d, bvh and `MeshRayCast`, in [`rivals`] |
+//! | [`clearance`] | casts and ticks with the grid of clearances | the same without |
+//! | [`growth`] | a tick by triangles, by surfaces and by particles | - |
 //! | [`shading`] | a frame full of a weathered surface | the same frame of a `StandardMaterial` |
 //! | [`wetting`] | water that runs, and surfaces at rest | a tick without surfaces |
 //! | [`splat`] | painting on the CPU, and sorting for the GPU | each other |
@@ -20,15 +22,18 @@
 
 mod bytes;
 mod cast;
+mod clearance;
 mod drawing;
 mod far;
 mod glb;
+mod growth;
 mod headless;
 mod hoff;
 mod live;
 mod measure;
 mod overlap;
 mod quads;
+mod rivals;
 mod scene;
 mod shading;
 mod sim;
@@ -59,7 +64,8 @@ criterion_group! {
     name = benches;
     config = config();
     // Memory first, while nothing has been given back to the allocator that it could hand out again.
-    targets = bytes::bench, baseline_is_right, tick::bench, live::bench, far::bench, cast::bench, splat::bench,
-        wetting::bench, shading::bench, overlap::bench, drawing::bench
+    targets = bytes::bench, baseline_is_right, tick::bench, live::bench, far::bench, cast::bench,
+        clearance::bench, splat::bench, wetting::bench, growth::bench, shading::bench, overlap::bench,
+        drawing::bench
 }
 criterion_main!(benches);
