@@ -4,10 +4,11 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::frames::{FramesWork, SurfaceFrames, measure_frames, release_frames};
-use super::stamping::{Site, splat_from_impact, unit_hash};
+use super::site::Site;
+use super::stamping::{splat_from_impact, unit_hash};
 use super::{Splat, StampAtlas, StampSpace, TexelArea, Weatherable};
 use crate::clock::WeatheringClock;
-use crate::collision::{Impact, Impacts, SurfaceCollider};
+use crate::collision::{DeformingCollider, Impact, Impacts, SurfaceCollider};
 use crate::effect::drops::splashes;
 use crate::effect::{Carries, EffectRow, EffectTable, RefreshEffects, WeatherEffect};
 use crate::emitter::NewParticles;
@@ -149,6 +150,7 @@ type Stamped = (
     Option<&'static mut MatterQueue>,
     Option<&'static SurfaceFrames>,
     Option<&'static GlobalTransform>,
+    Option<&'static DeformingCollider>,
 );
 
 /// Turns this tick's impacts into splats, in their order.
@@ -163,7 +165,7 @@ pub fn deposit_splats(
 ) {
     let room = config.max_alive as usize - particles.len().min(config.max_alive as usize);
     for impact in &impacts.0 {
-        let Ok((surface, mut queue, mut totals, drops, matter, frames, transform)) =
+        let Ok((surface, mut queue, mut totals, drops, matter, frames, transform, deforming)) =
             surfaces.get_mut(impact.surface)
         else {
             continue;
@@ -176,7 +178,7 @@ pub fn deposit_splats(
         totals.water_nl += u64::from(water_nl);
         let site = frames
             .zip(transform)
-            .map(|(frames, transform)| Site { frames: &frames.0, world_from_mesh: transform.affine() });
+            .and_then(|(frames, transform)| Site::of(impact, &frames.0, transform, deforming));
         let splat = splat_from_impact(impact, row, effect, surface, site.as_ref(), clock.tick(), water_nl);
         queue.push(splat);
         if let Some(mut matter) = matter

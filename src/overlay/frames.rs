@@ -10,9 +10,9 @@ use bytemuck::{Pod, Zeroable};
 
 use super::kernel::{cross_axes, unpack_axis};
 use super::{StampSpace, TILE_SIZE, Weatherable, Wrap};
-use crate::collision::{BoxOverlaps, DeformingCollider, MeshTriangles, SurfaceCollider};
+use crate::collision::{BoxOverlaps, MeshTriangles, SurfaceCollider};
 use crate::effect::{EffectTable, WeatherEffect};
-use crate::wetting::{TexelGeometry, WetGeometry, surface_points};
+use crate::wetting::{TexelGeometry, TexelLayout, WetGeometry, surface_points};
 
 /// A texel's place, in whole numbers. A row of the GPU's frame buffer: `TexelFrame` in `shaders/splat.wgsl` has the same
 /// fields. Zero where nothing lies.
@@ -65,13 +65,13 @@ pub(super) fn pack_axis(axis: Vec3) -> u32 {
 
 /// The places of all texels of a surface, in the space of its mesh at rest. Comes with the surface's geometry.
 #[derive(Component, Clone)]
-pub struct SurfaceFrames(pub(crate) Arc<Frames>, Arc<TexelGeometry>);
+pub struct SurfaceFrames(pub(crate) Arc<Frames>, Arc<TexelLayout>);
 
 impl SurfaceFrames {
     /// Measures a mesh for a map of `size` x `size` texels.
     pub fn new(triangles: &MeshTriangles, size: u32, wrap: [Wrap; 2]) -> Self {
         let geometry = TexelGeometry::new(triangles, &Affine3A::IDENTITY, Vec3::Y, size, wrap);
-        Self(Arc::new(Frames::new(triangles, &geometry, wrap)), Arc::new(geometry))
+        Self(Arc::new(Frames::new(triangles, &geometry, wrap)), geometry.layout().clone())
     }
 
     /// The texels, row by row.
@@ -172,7 +172,7 @@ fn tile_boxes(texels: &[TexelFrame], size: u32) -> (Vec<u32>, Vec<(Vec3, Vec3)>)
 /// What is being measured.
 #[derive(Resource, Default)]
 pub(crate) struct FramesWork {
-    tasks: EntityHashMap<(Arc<TexelGeometry>, Task<Frames>)>,
+    tasks: EntityHashMap<(Arc<TexelLayout>, Task<Frames>)>,
 }
 
 type Measurable = (
@@ -181,7 +181,6 @@ type Measurable = (
     &'static WetGeometry,
     &'static SurfaceCollider,
     Option<&'static SurfaceFrames>,
-    Has<DeformingCollider>,
 );
 
 impl FramesWork {
@@ -199,11 +198,11 @@ pub(super) fn measure_frames(
     surfaces: Query<Measurable>,
 ) {
     let work = work.bypass_change_detection();
-    work.tasks.retain(|entity, (geometry, task)| {
+    work.tasks.retain(|entity, (layout, task)| {
         let Some(frames) = check_ready(task) else { return true };
         // What was another shape in the meantime is measured again.
-        if surfaces.get(*entity).is_ok_and(|(_, _, current, ..)| Arc::ptr_eq(&current.0, geometry)) {
-            let measured = SurfaceFrames(Arc::new(frames), geometry.clone());
+        if surfaces.get(*entity).is_ok_and(|(_, _, current, ..)| Arc::ptr_eq(current.0.layout(), layout)) {
+            let measured = SurfaceFrames(Arc::new(frames), layout.clone());
             commands.entity(*entity).insert(measured);
         }
         false
@@ -212,16 +211,17 @@ pub(super) fn measure_frames(
     if !paints {
         return;
     }
-    for (entity, surface, geometry, collider, frames, deforms) in &surfaces {
-        let measured = frames.is_some_and(|frames| Arc::ptr_eq(&frames.1, &geometry.0));
-        let wanted = surface.stamps == StampSpace::Surface && !deforms;
+    for (entity, surface, geometry, collider, frames) in &surfaces {
+        let layout = geometry.0.layout();
+        let measured = frames.is_some_and(|frames| Arc::ptr_eq(&frames.1, layout));
+        let wanted = surface.stamps == StampSpace::Surface;
         if !wanted || measured || work.tasks.contains_key(&entity) {
             continue;
         }
         let (bvh, wrap) = (collider.0.clone(), surface.wrap());
         let of = geometry.0.clone();
         let task = AsyncComputeTaskPool::get().spawn(async move { Frames::new(bvh.triangles(), &of, wrap) });
-        work.tasks.insert(entity, (geometry.0.clone(), task));
+        work.tasks.insert(entity, (layout.clone(), task));
     }
 }
 

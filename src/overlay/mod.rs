@@ -20,6 +20,7 @@ mod frames;
 mod gpu;
 pub mod kernel;
 mod maps;
+mod site;
 mod splat;
 mod stamping;
 mod tiles;
@@ -61,8 +62,8 @@ pub struct Weatherable {
 #[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StampSpace {
     /// On the surface: round whatever the uvs do to it, across the borders of uv islands and never on a neighbour in the
-    /// image. Takes 16 bytes a texel once something is painted, twice with a renderer. Surfaces that are posed have theirs on
-    /// the map.
+    /// image. Takes 16 bytes a texel once something is painted, twice with a renderer. On surfaces that are posed a stamp is round
+    /// in the pose in which it came to be, and moves and stretches with the surface from then on.
     #[default]
     Surface,
     /// On the map: over its edges by [`Wrap`], into every tile of tiled uvs.

@@ -1,21 +1,16 @@
 //! The stamp an impact leaves: as large in metres as its effect says, wherever the uvs are wide or narrow.
 
-use bevy::math::{Affine3A, Vec3A};
+use bevy::math::Vec3A;
 use bevy::prelude::*;
 use bytemuck::Zeroable;
 
-use super::frames::{Frames, pack_axis};
+use super::frames::pack_axis;
+use super::site::Site;
 use super::splat::pack_unorm;
 use super::{Splat, Weatherable};
 use crate::collision::Impact;
 use crate::effect::drops::{drop_mm3, spread_mm};
 use crate::effect::{EffectRow, StampTurn, WeatherEffect};
-
-/// A surface that is stamped on where it is, not on its map.
-pub(super) struct Site<'a> {
-    pub(super) frames: &'a Frames,
-    pub(super) world_from_mesh: Affine3A,
-}
 
 /// A drop of diameter d spreads to `d We^1/4`; We grows with d, and d with the cube root of the volume.
 const SPREAD_BY_VOLUME: f32 = 5.0 / 12.0;
@@ -109,7 +104,7 @@ pub(super) fn splat_from_impact(
         Some(site) if effect.paints() => {
             // Never so small that it falls between texels.
             let pitch = 1.0 / (impact.uv_per_metre.min_element() * size as f32).max(1e-6);
-            lay_in_space(&mut splat, site, impact.point, [s, t, axes.n], &axes, long.max(0.75 * pitch));
+            lay_in_space(&mut splat, site, [s, t, axes.n], &axes, long.max(0.75 * pitch));
         }
         _ => {
             let [u, v] = impact.along;
@@ -122,8 +117,8 @@ pub(super) fn splat_from_impact(
 }
 
 /// Puts a stamp of this radius, metres, where it is on the surface. `rows`: its axes, drawn out; all in world space.
-fn lay_in_space(splat: &mut Splat, site: &Site, point: Vec3, rows: [Vec3; 3], axes: &Axes, radius: f32) {
-    let (frames, matrix) = (site.frames, site.world_from_mesh.matrix3);
+fn lay_in_space(splat: &mut Splat, site: &Site, rows: [Vec3; 3], axes: &Axes, radius: f32) {
+    let (frames, matrix) = (site.frames, site.world_from_mesh);
     let step = frames.step();
     // From steps of the mesh to 1/256 radius.
     let scale = f64::from(step) * 256.0 / f64::from(radius) * 65_536.0;
@@ -131,7 +126,7 @@ fn lay_in_space(splat: &mut Splat, site: &Site, point: Vec3, rows: [Vec3; 3], ax
     let row = |axis: Vec3| in_mesh(axis).to_array().map(|part| (f64::from(part) * scale).round() as i32);
     [splat.row_s, splat.row_t, splat.row_n] = rows.map(row);
     let metres_per_step = step * matrix.determinant().abs().cbrt();
-    splat.origin = frames.steps(site.world_from_mesh.inverse().transform_point3(point));
+    splat.origin = frames.steps(site.point);
     splat.reach = (2.0 * radius / metres_per_step.max(1e-12)).ceil().clamp(2.0, 131_070.0) as i32;
     let axis = |axis: Vec3| pack_axis(in_mesh(axis).normalize_or_zero());
     (splat.axis_s, splat.axis_t, splat.axis_n) = (axis(axes.s), axis(axes.t), axis(axes.n));
@@ -157,6 +152,9 @@ fn signed_hash(number: u32) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use bevy::math::Affine3A;
+
+    use super::super::frames::Frames;
     use super::*;
     use crate::collision::MeshTriangles;
     use crate::effect::{EffectIndex, EffectTable};
@@ -241,7 +239,7 @@ mod tests {
             velocity: turn * Vec3::NEG_Y,
             ..impact(Vec3::ZERO)
         };
-        let site = Site { frames: &frames, world_from_mesh };
+        let site = Site::rigid(&frames, &world_from_mesh, hit.point);
         let splat = splat(&hit, WeatherEffect { stamp_turn: StampTurn::Flight, ..paint(0.5) }, Some(&site));
         assert_eq!(splat.in_space, 1);
         assert_eq!(splat.axis_n, frames.texels[0].normal);

@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use super::geometry::{Link, Side};
 use super::{Dripping, SurfaceWater, TexelGeometry, WetGeometry};
 use crate::clock::WeatheringClock;
-use crate::collision::{MeshTriangles, SurfaceCollider};
+use crate::collision::{DeformingCollider, MeshTriangles, SurfaceCollider};
 use crate::effect::{Carries, EffectIndex, ParticleLook, Sprite, WeatherEffect};
 use crate::emitter::NewParticles;
 use crate::matter::FallingSnow;
@@ -86,7 +86,7 @@ pub(super) fn shed_drips(
     mut surfaces: Query<Shedding>,
 ) {
     order.clear();
-    let sheds = |(_, drips, snow, ..): &(Entity, &Dripping, &FallingSnow, _, _, _, _)| {
+    let sheds = |(_, drips, snow, ..): &(Entity, &Dripping, &FallingSnow, _, _, _, _, _)| {
         !drips.0.is_empty() || !snow.0.is_empty()
     };
     order.extend(surfaces.iter().filter(sheds).map(|(entity, ..)| entity));
@@ -94,14 +94,15 @@ pub(super) fn shed_drips(
     order.sort_unstable();
     let ticks_left = (LIFETIME * clock.hz() as f32).min(f32::from(Lifespan::MAX_TICKS)) as u16;
     for &entity in order.iter() {
-        let Ok((_, mut drips, mut snow, water, geometry, collider, transform)) = surfaces.get_mut(entity)
+        let Ok((_, mut drips, mut snow, water, geometry, collider, transform, deforming)) =
+            surfaces.get_mut(entity)
         else {
             continue;
         };
+        let stance = Stance::new(&geometry.0, collider.0.triangles(), transform, deforming);
         let mut shed = |site: DripSite, texel: u32, volume_nl: u32, effect: EffectIndex| {
-            let position = start_of(site, texel, &geometry.0, collider.0.triangles(), &transform.affine());
+            let (position, velocity) = (stance.start_of(site, texel), stance.velocity(texel, &clock));
             let lifespan = Lifespan { ticks_left, born_at: 0 };
-            let velocity = Vec3::ZERO;
             new.push(|sequence| Particle {
                 position,
                 velocity,
@@ -132,28 +133,73 @@ type Shedding = (
     &'static WetGeometry,
     &'static SurfaceCollider,
     &'static GlobalTransform,
+    Option<&'static DeformingCollider>,
 );
 
-/// Where a drop begins to fall: in front of what is steep, beyond the edge of what is flat, below what overhangs.
-fn start_of(
-    site: DripSite,
-    texel: u32,
-    geometry: &TexelGeometry,
-    triangles: &MeshTriangles,
-    world_from_mesh: &Affine3A,
-) -> Vec3 {
-    let at = |texel| geometry.point(texel, triangles, world_from_mesh);
-    let Some((point, normal)) = at(texel) else { return Vec3::ZERO };
-    let off = normal * CLEARANCE;
-    match site {
-        DripSite::Edge(side) if geometry.facing_up(texel) > 0.5 => {
-            let behind = match geometry.link(texel, side.opposite()) {
-                Link::Texel(behind) => at(behind),
-                Link::Edge => None,
-            };
-            let out = behind.map_or(Vec3::ZERO, |(behind, _)| (point - behind).normalize_or_zero());
-            point + out * (0.5 * geometry.distance(texel, side) + CLEARANCE) + off
+/// A surface as it stands now.
+struct Stance<'a> {
+    geometry: &'a TexelGeometry,
+    triangles: &'a MeshTriangles,
+    world_from_mesh: Affine3A,
+    /// If it is posed: the pose, and where that lies.
+    posed: Option<(&'a DeformingCollider, Affine3A)>,
+}
+
+impl<'a> Stance<'a> {
+    fn new(
+        geometry: &'a TexelGeometry,
+        triangles: &'a MeshTriangles,
+        transform: &GlobalTransform,
+        deforming: Option<&'a DeformingCollider>,
+    ) -> Self {
+        let is_known = |deforming: &&DeformingCollider| deforming.posed().is_some();
+        let posed = deforming.filter(is_known).map(|pose| (pose, pose.world_from_shape(transform)));
+        Self { geometry, triangles, world_from_mesh: transform.affine(), posed }
+    }
+
+    /// Where a texel's middle lies in the world, and the normal there. In a pose that is not a number, where it lies at rest.
+    fn point(&self, texel: u32) -> Option<(Vec3, Vec3)> {
+        self.posed_point(texel)
+            .or_else(|| self.geometry.point(texel, self.triangles, &self.world_from_mesh))
+            .filter(|(point, _)| point.is_finite())
+    }
+
+    fn posed_point(&self, texel: u32) -> Option<(Vec3, Vec3)> {
+        let (pose, world_from_shape) = self.posed?;
+        let (posed, owner) = (pose.posed()?, self.geometry.owner(texel)? as usize);
+        let uvs = posed.triangles().uvs.get(owner)?;
+        let corners = posed.corners(owner).map(|corner| world_from_shape.transform_point3(corner));
+        let mirrored = world_from_shape.matrix3.determinant() < 0.0;
+        let found = self.geometry.point_on(texel, uvs, corners, mirrored);
+        (found.0.is_finite() && found.1.is_finite()).then_some(found)
+    }
+
+    /// How fast that place moves with its pose, m/s. What moves as a whole lets its drops go as if it stood still.
+    fn velocity(&self, texel: u32, clock: &WeatheringClock) -> Vec3 {
+        let velocity = || {
+            let (pose, world_from_shape) = self.posed?;
+            let owner = self.geometry.owner(texel)? as usize;
+            let weights = self.geometry.weights(texel, pose.posed()?.triangles().uvs.get(owner)?);
+            Some(world_from_shape.transform_vector3(pose.velocity(owner, weights, clock)))
+        };
+        velocity().filter(|velocity| velocity.is_finite()).unwrap_or_default()
+    }
+
+    /// Where a drop begins to fall: in front of what is steep, beyond the edge of what is flat, below what overhangs.
+    fn start_of(&self, site: DripSite, texel: u32) -> Vec3 {
+        let geometry = self.geometry;
+        let Some((point, normal)) = self.point(texel) else { return Vec3::ZERO };
+        let off = normal * CLEARANCE;
+        match site {
+            DripSite::Edge(side) if geometry.facing_up(texel) > 0.5 => {
+                let behind = match geometry.link(texel, side.opposite()) {
+                    Link::Texel(behind) => self.point(behind),
+                    Link::Edge => None,
+                };
+                let out = behind.map_or(Vec3::ZERO, |(behind, _)| (point - behind).normalize_or_zero());
+                point + out * (0.5 * geometry.distance(texel, side) + CLEARANCE) + off
+            }
+            _ => point + off,
         }
-        _ => point + off,
     }
 }

@@ -5,6 +5,9 @@
 //!
 //! Both vary slowly, so they are worked out on a grid of [`Exposure::CELLS`] cells a side over the map, in the background,
 //! and laid between the cells bilinearly. Until that is done every texel counts as free and shaded.
+//!
+//! Meshes that are posed count as they are at rest, where their entity stands: what is shaded by a raised arm stays so when the
+//! arm comes down. Rays for every pose would cost more than all water does.
 
 use std::sync::Arc;
 
@@ -13,7 +16,7 @@ use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
 use super::points::surface_points;
-use super::{Now, SurfaceWater, TexelGeometry, WetGeometry};
+use super::{Now, SurfaceWater, TexelLayout, WetGeometry};
 use crate::clock::WeatheringClock;
 use crate::collision::{CollisionScene, MeshBvh, MeshColliders, NotWeatherable, SurfaceCollider};
 use crate::material::PorousMaterial;
@@ -145,7 +148,7 @@ fn between_cells(grid: &[[f32; 2]], cells: u32, size: u32, wrap: [Wrap; 2], x: u
 /// The work that is under way.
 #[derive(Resource, Default)]
 pub struct ExposureProgress {
-    task: Option<Task<Vec<(Entity, Arc<TexelGeometry>, Exposure)>>>,
+    task: Option<Task<Vec<(Entity, Arc<TexelLayout>, Exposure)>>>,
     /// How many there were when it began.
     surfaces: usize,
 }
@@ -159,7 +162,7 @@ impl ExposureProgress {
 
 struct Job {
     surface: Entity,
-    geometry: Arc<TexelGeometry>,
+    geometry: Arc<TexelLayout>,
     bvh: Arc<MeshBvh>,
     world_from_mesh: Affine3A,
     size: u32,
@@ -195,7 +198,7 @@ pub(super) fn bake_exposure(
         progress.task = None;
         for (entity, geometry, exposure) in baked {
             let Ok((_, current, _, _, mut water, material, old)) = surfaces.get_mut(entity) else { continue };
-            if !Arc::ptr_eq(&geometry, &current.0) {
+            if !Arc::ptr_eq(&geometry, current.0.layout()) {
                 continue;
             }
             // What has dried until now has dried by the old one.
@@ -237,7 +240,7 @@ pub(super) fn bake_exposure(
         let (world_from_mesh, bvh) = (transform.affine(), collider.0.clone());
         scene.push((surface, world_from_mesh, bvh.clone()));
         let (size, wrap) = (water.size, water.wrap);
-        jobs.push(Job { surface, geometry: geometry.0.clone(), bvh, world_from_mesh, size, wrap });
+        jobs.push(Job { surface, geometry: geometry.0.layout().clone(), bvh, world_from_mesh, size, wrap });
     }
     scene.sort_unstable_by_key(|(entity, ..)| *entity);
     progress.task = Some(AsyncComputeTaskPool::get().spawn(async move {

@@ -1,5 +1,7 @@
 //! What water needs to know about each texel of a map to run over the real surface.
 
+use std::sync::Arc;
+
 use bevy::math::{Affine3A, DVec2, Vec2, Vec3};
 
 use super::Units;
@@ -9,15 +11,13 @@ use super::gutters::Gutters;
 use super::links::Links;
 use super::ownership::{NOBODY, Ownership};
 use super::points::front_normals;
+use super::slopes::Slopes;
 use super::walk::Surface;
 use crate::collision::MeshTriangles;
 use crate::overlay::{TexelAreas, Wrap};
 
 pub use super::grid::Side;
 pub use super::links::Link;
-
-/// `facing_up` of a texel that faces up.
-const STRAIGHT_UP: f32 = 127.0;
 
 /// Marks a texel among triangles. There are fewer triangles than this.
 const STAND_IN: u32 = 1 << 31;
@@ -28,27 +28,28 @@ const STAND_IN: u32 = 1 << 31;
 /// covers its middle or, if none does, by a triangle too small to cover any middle.
 ///
 /// The mesh is that of one moment: move, turn or scale it, and this must be made anew (which takes about a
-/// second for the largest map). It does not know of gaps too narrow for a texel, nor of edges that touch
-/// without sharing their corners: the mesh ends there.
+/// second for the largest map); [`Self::posed`] takes it to another pose of the same triangles for less. It does
+/// not know of gaps too narrow for a texel, nor of edges that touch without sharing their corners: the mesh ends
+/// there.
 ///
 /// Methods that take a texel panic if the map has no such texel.
 pub struct TexelGeometry {
+    layout: Arc<TexelLayout>,
+    slopes: Slopes,
+}
+
+/// What does not change when the mesh takes another pose.
+pub(crate) struct TexelLayout {
     size: u32,
     area_mm2: Vec<f32>,
     mean_mm2: f32,
-    /// Metres, by texel.
-    height: Vec<f32>,
-    /// By texel, 127 for 1.
-    facing_up: Vec<i8>,
     /// By texel: its triangle, or [`STAND_IN`] and the texel that stands in for it, or [`NOBODY`].
     owner: Vec<u32>,
     links: Links,
     gutters: Gutters,
     /// A tile, and another with texels that show what the first one holds; ascending.
     gutter_tiles: Vec<(u32, u32)>,
-    /// Length of a texel along u and v, metres, by triangle.
-    lengths: Vec<[f32; 2]>,
-    /// Length of a mean texel, for those without a triangle.
+    /// Length of a mean texel, metres, for those without a triangle.
     mean_length: f32,
 }
 
@@ -69,13 +70,10 @@ impl TexelGeometry {
         let owners = Ownership::new(triangles, grid);
         let finder = Finder::new(grid, &surface, &owners);
         let (links, mut gutters) = (Links::new(&finder), Gutters::new(&finder));
-        let height = heights(&finder, up);
-        let facing: Vec<i8> = front_normals(triangles, world_from_mesh)
-            .iter()
-            .map(|normal| (normal.dot(up).clamp(-1.0, 1.0) * STRAIGHT_UP).round() as i8)
-            .collect();
-        let facing_up =
-            owners.triangle.iter().map(|&owner| facing.get(owner as usize).copied().unwrap_or(0)).collect();
+        let above_origin =
+            |texel: u32| finder.place(texel).map(|place| surface.in_space(&place).dot(up.as_dvec3()) as f32);
+        let heights = (0..grid.texels() as u32).map(above_origin);
+        let normals = front_normals(triangles, world_from_mesh);
         let mean_length = positive_or(areas.mean_mm2.sqrt() * 1e-3, 1e-3);
         let lengths = (0..surface.map.len() as u32).map(|triangle| {
             [DVec2::X, DVec2::Y].map(|step| {
@@ -83,56 +81,81 @@ impl TexelGeometry {
                 positive_or(length, mean_length)
             })
         });
-        let lengths = lengths.collect();
+        let facing = normals.iter().map(|normal| normal.dot(up));
+        let slopes = Slopes::new(heights, &owners.triangle, facing, lengths.collect());
         let mut owner = owners.triangle;
         gutters.take_stand_ins().for_each(|(texel, other)| owner[texel as usize] = STAND_IN | other);
-        Self {
+        let layout = TexelLayout {
             size,
-            lengths,
             area_mm2: areas.mm2,
             mean_mm2: areas.mean_mm2,
-            height,
-            facing_up,
             gutter_tiles: gutters.tiles(size),
             links,
             gutters,
             mean_length,
             owner,
-        }
+        };
+        Self { layout: Arc::new(layout), slopes }
+    }
+
+    /// The same surface in another pose: heights, slopes and distances are those of `corners`, the triangles of the same
+    /// mesh in world space, in the same order; `mirrored` if a mirror has brought them there. Areas, links and owners stay
+    /// what they are at rest.
+    pub fn posed(&self, uvs: &[[Vec2; 3]], corners: &[[Vec3; 3]], mirrored: bool, up: Vec3) -> Self {
+        let (layout, up) = (self.layout.clone(), up.normalize_or(Vec3::Y));
+        let front = if mirrored { -up } else { up };
+        // Far from the origin of the world, few digits would be left for a texel.
+        let origin = corners.first().map_or(Vec3::ZERO, |corners| corners[0]);
+        let heights = (0..layout.owner.len() as u32).map(|texel| {
+            let owner = self.owner(texel)? as usize;
+            let ([a, b, c], [to_b, to_c]) = (*corners.get(owner)?, self.weights(texel, uvs.get(owner)?));
+            Some(up.dot((a - origin) + (b - a) * to_b + (c - a) * to_c))
+        });
+        let facing = corners.iter().map(|[a, b, c]| (b - a).cross(c - a).normalize_or_zero().dot(front));
+        let lengths = corners.iter().zip(uvs).map(|(&corners, &uvs)| {
+            texel_lengths(corners, uvs, layout.size).map(|length| positive_or(length, layout.mean_length))
+        });
+        let slopes = Slopes::new(heights, &layout.owner, facing, lengths.collect());
+        Self { layout, slopes }
+    }
+
+    /// What it has in common with the same surface in other poses.
+    pub(crate) fn layout(&self) -> &Arc<TexelLayout> {
+        &self.layout
     }
 
     /// Texels along each side of the map.
     pub fn size(&self) -> u32 {
-        self.size
+        self.layout.size
     }
 
     /// World area that each texel stands for, mm²; the values of [`TexelAreas`]. 0 where nothing lies.
     pub fn area_mm2(&self) -> &[f32] {
-        &self.area_mm2
+        &self.layout.area_mm2
     }
 
     /// Mean area of the texels that stand for anything, mm².
     pub fn mean_mm2(&self) -> f32 {
-        self.mean_mm2
+        self.layout.mean_mm2
     }
 
     /// How high each texel's middle lies above the lowest of the surface, metres along `up`. 0 where nothing
     /// lies.
     pub fn height(&self) -> &[f32] {
-        &self.height
+        self.slopes.height()
     }
 
     /// Cosine of the angle between up and the front of a texel's triangle, -1..=1 in steps of 1/127: 1 on a
     /// floor, 0 on a wall, -1 on a ceiling. 0 where nothing lies.
     #[inline]
     pub fn facing_up(&self, texel: u32) -> f32 {
-        f32::from(self.facing_up[texel as usize]) / STRAIGHT_UP
+        self.slopes.facing_up(texel)
     }
 
     /// The triangle that a texel lies on, an index into the lists of [`MeshTriangles`].
     #[inline]
     pub fn owner(&self, texel: u32) -> Option<u32> {
-        Some(self.owner[texel as usize]).filter(|&owner| owner < STAND_IN)
+        Some(self.layout.owner[texel as usize]).filter(|&owner| owner < STAND_IN)
     }
 
     /// What lies on a side of a texel on the mesh, over seams between islands, too. [`Link::Edge`] where the
@@ -142,22 +165,22 @@ impl TexelGeometry {
     /// may lead back on another side or to a texel beside.
     #[inline]
     pub fn link(&self, texel: u32, side: Side) -> Link {
-        self.links.get(texel, side)
+        self.layout.links.get(texel, side)
     }
 
     /// Metres on the surface from a texel's middle to that of its neighbour in the image, by the density of
     /// the texel's own triangle; above 0.
     #[inline]
     pub fn distance(&self, texel: u32, side: Side) -> f32 {
-        let lengths = self.lengths.get(self.owner[texel as usize] as usize);
-        lengths.map_or(self.mean_length, |lengths| lengths[side.axis()])
+        let lengths = self.slopes.lengths(self.layout.owner[texel as usize]);
+        lengths.map_or(self.layout.mean_length, |lengths| lengths[side.axis()])
     }
 
     /// The texel that stands for the surface at this one: itself if a triangle owns it; else, up to 8 texels
     /// off an island (columns plus rows), the one that a way over the mesh straight across the island's
     /// border leads to. Where the mesh ends at that border, the texel of the border. None further out.
     pub fn stand_in(&self, texel: u32) -> Option<u32> {
-        match self.owner[texel as usize] {
+        match self.layout.owner[texel as usize] {
             NOBODY => None,
             other if other >= STAND_IN => Some(other - STAND_IN),
             _ => Some(texel),
@@ -167,15 +190,15 @@ impl TexelGeometry {
     /// For a texel that nobody owns but that lies within 2 columns and 2 rows of one that somebody does: the
     /// nearest such texel in the image. None for all others.
     pub fn gutter_source(&self, texel: u32) -> Option<u32> {
-        self.gutters.source(texel)
+        self.layout.gutters.source(texel)
     }
 
     /// Adds the tiles that show anything of these, beyond their own texels.
     pub(super) fn add_gutter_tiles(&self, tiles: &mut Vec<u32>) {
         for index in 0..tiles.len() {
             let own = tiles[index];
-            let from = self.gutter_tiles.partition_point(|&(tile, _)| tile < own);
-            let showing = self.gutter_tiles[from..].iter().take_while(|&&(tile, _)| tile == own);
+            let from = self.layout.gutter_tiles.partition_point(|&(tile, _)| tile < own);
+            let showing = self.layout.gutter_tiles[from..].iter().take_while(|&&(tile, _)| tile == own);
             tiles.extend(showing.map(|&(_, other)| other));
         }
     }
@@ -189,52 +212,65 @@ impl TexelGeometry {
         world_from_mesh: &Affine3A,
     ) -> Option<(Vec3, Vec3)> {
         let owner = self.owner(texel)? as usize;
-        let [a, b, c] = triangles.positions[owner].map(|corner| world_from_mesh.transform_point3(corner));
-        let [uv_a, uv_b, uv_c] = triangles.uvs[owner];
-        let middle = Vec2::new((texel % self.size) as f32 + 0.5, (texel / self.size) as f32 + 0.5);
+        let corners = triangles.positions.get(owner)?.map(|corner| world_from_mesh.transform_point3(corner));
+        let mirrored = world_from_mesh.matrix3.determinant() < 0.0;
+        Some(self.point_on(texel, triangles.uvs.get(owner)?, corners, mirrored))
+    }
+
+    /// Where a texel's middle lies on its triangle, and the normal of that, by the triangle's corners as they are now.
+    /// `mirrored`: they have come there by a mirror, which turns the winding round.
+    pub(crate) fn point_on(
+        &self,
+        texel: u32,
+        uvs: &[Vec2; 3],
+        [a, b, c]: [Vec3; 3],
+        mirrored: bool,
+    ) -> (Vec3, Vec3) {
+        let [to_b, to_c] = self.weights(texel, uvs);
+        let normal = (b - a).cross(c - a).normalize_or(Vec3::Y);
+        (a + (b - a) * to_b + (c - a) * to_c, if mirrored { -normal } else { normal })
+    }
+
+    /// Weights of the second and third corner of a texel's triangle, with these uvs, at the texel's middle.
+    pub(crate) fn weights(&self, texel: u32, &[uv_a, uv_b, uv_c]: &[Vec2; 3]) -> [f32; 2] {
+        let size = self.layout.size;
+        let middle = Vec2::new((texel % size) as f32 + 0.5, (texel / size) as f32 + 0.5);
         // The copy of the map that the triangle lies in: its points are nearer to the middle of its box than to any other's.
         let center = (uv_a.min(uv_b).min(uv_c) + uv_a.max(uv_b).max(uv_c)) / 2.0;
-        let uv = middle / self.size as f32;
+        let uv = middle / size as f32;
         let uv = uv + (center - uv).round();
         let (ab, ac, at) = (uv_b - uv_a, uv_c - uv_a, uv - uv_a);
         let area = ab.perp_dot(ac);
         let inside = |part: f32| if part.is_finite() { part.clamp(0.0, 1.0) } else { 1.0 / 3.0 };
         let (to_b, to_c) = (inside(at.perp_dot(ac) / area), inside(ab.perp_dot(at) / area));
-        let normal =
-            (b - a).cross(c - a).normalize_or(Vec3::Y) * world_from_mesh.matrix3.determinant().signum();
-        Some((a + (b - a) * to_b + (c - a) * to_c, normal))
+        // A triangle that is too small to cover the middle is not left for it.
+        let sum = (to_b + to_c).max(1.0);
+        [to_b / sum, to_c / sum]
     }
 
     /// Depth of a unit on a texel, mm. Where nothing lies, a texel counts as one of mean size.
     pub fn unit_mm(&self, units: Units, texel: u32) -> f64 {
-        let area = self.area_mm2[texel as usize];
-        units.mm_on(if area > 0.0 { area } else { self.mean_mm2 }.max(1e-6))
+        let area = self.layout.area_mm2[texel as usize];
+        units.mm_on(if area > 0.0 { area } else { self.layout.mean_mm2 }.max(1e-6))
     }
 
     /// Memory held, bytes.
     pub fn bytes(&self) -> usize {
-        (self.area_mm2.capacity() + self.height.capacity()) * size_of::<f32>()
-            + self.facing_up.capacity()
-            + self.owner.capacity() * size_of::<u32>()
-            + self.lengths.capacity() * size_of::<[f32; 2]>()
-            + self.links.bytes()
-            + self.gutters.bytes()
+        let layout = &self.layout;
+        layout.area_mm2.capacity() * size_of::<f32>()
+            + layout.owner.capacity() * size_of::<u32>()
+            + layout.links.bytes()
+            + layout.gutters.bytes()
+            + self.slopes.bytes()
     }
 }
 
-/// Heights of the texels above the lowest.
-fn heights(finder: &Finder, up: Vec3) -> Vec<f32> {
-    let above_origin = |texel: u32| {
-        finder.place(texel).map(|place| finder.surface.in_space(&place).dot(up.as_dvec3()) as f32)
-    };
-    let texels = finder.grid.texels() as u32;
-    let mut heights: Vec<f32> = (0..texels).map(|texel| above_origin(texel).unwrap_or(f32::NAN)).collect();
-    // The minimum of a number and NaN is the number.
-    let lowest = heights.iter().copied().fold(f32::INFINITY, f32::min);
-    for height in &mut heights {
-        *height = if height.is_nan() { 0.0 } else { *height - lowest };
-    }
-    heights
+/// Length of a texel along u and v on a triangle, metres; 0 or not a number if it has none.
+fn texel_lengths([a, b, c]: [Vec3; 3], [uv_a, uv_b, uv_c]: [Vec2; 3], size: u32) -> [f32; 2] {
+    let (uv_ab, uv_ac) = ((uv_b - uv_a) * size as f32, (uv_c - uv_a) * size as f32);
+    let area = uv_ab.perp_dot(uv_ac);
+    let length = |along_b: f32, along_c: f32| ((b - a) * along_b - (c - a) * along_c).length() / area.abs();
+    [length(uv_ac.y, uv_ab.y), length(uv_ac.x, uv_ab.x)]
 }
 
 /// A length if it is one, else `other`.
@@ -273,6 +309,39 @@ mod tests {
                     let distance = geometry.distance(texel, side);
                     assert!((distance - expected * step).abs() < 1e-5, "{texel} {side:?} {distance}");
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn another_pose_has_heights_slopes_and_distances_of_its_own() {
+        let rest = slope(5);
+        let geometry = TexelGeometry::new(&rest, &Affine3A::IDENTITY, Vec3::Y, 32, REPEAT);
+        let turned = Affine3A::from_translation(Vec3::Y * 30.0) * Affine3A::from_rotation_x(0.9);
+        let mirror = Affine3A::from_scale(Vec3::new(-1.0, 1.0, 1.0));
+        for (pose, mirrored) in [(turned, false), (turned * mirror, true)] {
+            let to_world = |corners: &[Vec3; 3]| corners.map(|corner| pose.transform_point3(corner));
+            let corners: Vec<_> = rest.positions.iter().map(to_world).collect();
+            let posed = geometry.posed(&rest.uvs, &corners, mirrored, Vec3::Y);
+            let anew = TexelGeometry::new(&rest, &pose, Vec3::Y, 32, REPEAT);
+            assert!(Arc::ptr_eq(posed.layout(), geometry.layout()));
+            for texel in 0..32 * 32 {
+                let height = |geometry: &TexelGeometry| geometry.height()[texel as usize];
+                assert!((height(&posed) - height(&anew)).abs() < 1e-4, "{texel}");
+                assert!((posed.facing_up(texel) - anew.facing_up(texel)).abs() < 0.01, "{texel}");
+                for side in Side::ALL {
+                    let (one, other) = (posed.distance(texel, side), anew.distance(texel, side));
+                    assert!((one - other).abs() < 1e-5, "{texel} {side:?}: {one} {other}");
+                }
+            }
+        }
+        // Flattened to a line, and no number at all.
+        for corner in [Vec3::X, Vec3::NAN, Vec3::splat(f32::INFINITY)] {
+            let posed = geometry.posed(&rest.uvs, &vec![[corner; 3]; rest.positions.len()], false, Vec3::Y);
+            for texel in 0..32 * 32 {
+                assert_eq!((posed.height()[texel as usize], posed.facing_up(texel)), (0.0, 0.0));
+                let distances = Side::ALL.map(|side| posed.distance(texel, side));
+                assert!(distances.iter().all(|&distance| distance > 0.0 && distance.is_finite()));
             }
         }
     }

@@ -12,6 +12,9 @@
 //! All of this is in the main world, in the tick, with and without a renderer: one owner, whole numbers, no way back from the
 //! GPU to wait for. What is drawn gets the tiles that changed ([`gpu`]).
 //!
+//! On meshes that are posed, water runs by the slopes of their pose (`posed`) and drips from where they are; areas and exposure
+//! are those of the mesh at rest.
+//!
 //! What it does to dust, mud and snow is told in [`matter`](crate::matter).
 //!
 //! Not here: water under the surface of a pool that flows; evaporation that cools.
@@ -31,10 +34,12 @@ pub mod look;
 mod marks;
 mod ownership;
 mod points;
+mod posed;
 mod prepare;
 pub(crate) mod query;
 mod rim;
 mod run_off;
+mod slopes;
 mod soak;
 pub mod spread;
 mod surface;
@@ -62,6 +67,7 @@ pub use surface::{Ledger, Stock, SurfaceWater};
 pub use texel::{Scale, TexelWater, Units};
 pub use tick::WettingStats;
 
+pub(crate) use geometry::TexelLayout;
 #[cfg(test)]
 pub(crate) use run_off::{RunScratch, run_off};
 pub(crate) use soak::note_arrival;
@@ -97,7 +103,12 @@ impl Plugin for WettingPlugin {
             .add_observer(prepare::release_surface)
             .add_systems(
                 PreUpdate,
-                (prepare::settle_before_new_material, prepare::measure_surfaces, exposure::bake_exposure)
+                (
+                    prepare::settle_before_new_material,
+                    prepare::measure_surfaces,
+                    posed::measure_posed_slopes,
+                    exposure::bake_exposure,
+                )
                     .chain()
                     .in_set(MeasureSurfaces)
                     .after(crate::collision::BuildColliders)

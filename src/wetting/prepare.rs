@@ -6,9 +6,10 @@ use bevy::math::Mat3A;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
+use super::posed::PosedSlopes;
 use super::{Dripping, DropQueue, Exposure, Now, SurfaceWater, TexelGeometry};
 use crate::clock::WeatheringClock;
-use crate::collision::{MeshBvh, SurfaceCollider};
+use crate::collision::{DeformingCollider, MeshBvh, SurfaceCollider};
 use crate::material::PorousMaterial;
 use crate::matter::{FallingSnow, MatterQueue, SurfaceMatter};
 use crate::overlay::{TexelArea, Weatherable, Wrap};
@@ -41,11 +42,22 @@ impl Measured {
         Some(geometry)
     }
 
-    fn is_of(&self, surface: &Weatherable, collider: &SurfaceCollider, transform: &GlobalTransform) -> bool {
+    fn is_of(
+        &self,
+        surface: &Weatherable,
+        collider: &SurfaceCollider,
+        transform: &GlobalTransform,
+        is_posed: bool,
+    ) -> bool {
         let matrix = transform.affine().matrix3;
         let scale = self.matrix.determinant().abs().cbrt().max(1e-12);
+        let change = |axis: usize| {
+            let (before, now) = (self.matrix.col(axis), matrix.col(axis));
+            // What is posed has slopes of its own, which follow when it turns.
+            if is_posed { (before.length() - now.length()).abs() } else { (before - now).length() }
+        };
         // A degree or two of turning changes nothing worth measuring again.
-        let turned = (0..3).any(|axis| (self.matrix.col(axis) - matrix.col(axis)).length() > 0.03 * scale);
+        let turned = (0..3).any(|axis| change(axis) > 0.03 * scale);
         !turned
             && (self.size, self.wrap) == (surface.texels(), surface.wrap())
             && Arc::ptr_eq(&self.bvh, &collider.0)
@@ -61,6 +73,7 @@ type Measurable = (
     Option<&'static mut Measured>,
     Option<&'static mut SurfaceWater>,
     Past,
+    Option<&'static DeformingCollider>,
 );
 
 /// By what the water of a surface has dried until now.
@@ -73,13 +86,19 @@ pub(super) fn measure_surfaces(
     drying: Res<DryingClock>,
     mut surfaces: Query<Measurable>,
 ) {
-    for (entity, surface, collider, texel, transform, mut measured, mut water, past) in &mut surfaces {
+    for (entity, surface, collider, texel, transform, mut measured, mut water, past, deforming) in
+        &mut surfaces
+    {
+        let is_posed = deforming.is_some_and(|deforming| deforming.posed().is_some());
         let changed = surface.is_changed() || collider.is_changed() || transform.is_changed();
         // What is being measured is finished first: a surface that keeps turning is measured as fast as that goes.
         let stale = match &measured {
             None => true,
             Some(measured) if measured.task.is_some() => false,
-            Some(measured) => (changed || measured.late) && !measured.is_of(&surface, &collider, &transform),
+            Some(measured) => {
+                let changed = changed || measured.late;
+                changed && !measured.is_of(&surface, &collider, &transform, is_posed)
+            }
         };
         let (size, wrap) = (surface.texels(), surface.wrap());
         if stale {
@@ -171,6 +190,7 @@ pub(super) fn release_surface(removed: On<Remove, Weatherable>, mut commands: Co
     commands.entity(removed.entity).try_remove::<(
         WetGeometry,
         Measured,
+        PosedSlopes,
         SurfaceWater,
         Exposure,
         FormerMaterial,

@@ -8,6 +8,7 @@ use bevy::mesh::skinning::SkinnedMesh;
 use bevy::prelude::*;
 
 use super::{Deformer, PosedMesh};
+use crate::clock::WeatheringClock;
 use crate::collision::{MeshBvh, SurfaceCollider};
 
 /// The posed shape of a surface whose mesh is skinned or morphed. Added besides its [`SurfaceCollider`].
@@ -19,7 +20,17 @@ pub struct DeformingCollider {
     /// What it will be posed by, if `stale`.
     next: Pose,
     stale: bool,
+    /// Tick in which it took its pose.
+    posed_at: u32,
+    /// Tick in which it took the pose before; none if that cannot be compared.
+    posed_before: Option<u32>,
 }
+
+/// Parts of a second. What has not been posed for longer than that stood still, and then jumped.
+const SLOWEST_POSES: u32 = 4;
+
+/// What moves faster than this has jumped, m/s.
+const FASTEST: f32 = 60.0;
 
 /// What a surface is posed by.
 #[derive(Default, PartialEq)]
@@ -33,7 +44,7 @@ impl DeformingCollider {
     /// Of a surface that shows this mesh; `None` if the mesh cannot be posed.
     pub fn new(mesh: Arc<MeshBvh>) -> Option<Self> {
         let posed = Arc::new(PosedMesh::new(mesh)?);
-        Some(Self { posed, pose: None, next: default(), stale: false })
+        Some(Self { posed, pose: None, next: default(), stale: false, posed_at: 0, posed_before: None })
     }
 
     /// The shape it has now; `None` until it is known.
@@ -47,7 +58,31 @@ impl DeformingCollider {
         transform: &GlobalTransform,
     ) -> Option<(Affine3A, Arc<PosedMesh>)> {
         let posed = self.posed()?.clone();
-        Some((if posed.is_in_world() { Affine3A::IDENTITY } else { transform.affine() }, posed))
+        Some((self.world_from_shape(transform), posed))
+    }
+
+    /// Where its shape lies, if the surface has this transform.
+    pub(crate) fn world_from_shape(&self, transform: &GlobalTransform) -> Affine3A {
+        if self.posed.is_in_world() { Affine3A::IDENTITY } else { transform.affine() }
+    }
+
+    /// How fast a point of a triangle is moved by poses, m/s in the space of the shape; 0 at rest, after a jump, and where it is
+    /// not known. `weights`: of the second and third corner. Several ticks may share a pose, that of their frame.
+    ///
+    /// # Panics
+    /// If there is no such triangle.
+    pub(crate) fn velocity(&self, triangle: usize, weights: [f32; 2], clock: &WeatheringClock) -> Vec3 {
+        let ticks = self.posed_before.map_or(0, |before| self.posed_at.saturating_sub(before));
+        let is_moving = ticks > 0
+            && ticks <= (clock.hz() / SLOWEST_POSES).max(1)
+            && clock.tick().saturating_sub(self.posed_at) < ticks;
+        if !is_moving {
+            return Vec3::ZERO;
+        }
+        let ([a, b, c], [to_b, to_c]) = (self.posed.moved(triangle), weights);
+        let velocity = (a + (b - a) * to_b + (c - a) * to_c) * (clock.hz() as f32 / ticks as f32);
+        // Not a number is not slower, either.
+        if velocity.length() < FASTEST { velocity } else { Vec3::ZERO }
     }
 
     fn is_of(&self, mesh: &Arc<MeshBvh>) -> bool {
@@ -73,13 +108,17 @@ impl DeformingCollider {
         self.stale
     }
 
-    /// Takes the pose that was noted.
-    pub(super) fn take_pose(&mut self) {
+    /// Takes the pose that was noted, in this tick.
+    pub(super) fn take_pose(&mut self, tick: u32) {
+        let before = self.pose.is_some().then_some((self.posed_at, self.posed.is_in_world()));
         let pose = self.pose.get_or_insert_default();
         std::mem::swap(pose, &mut self.next);
         self.stale = false;
         // In place, since the scene has let go of it; whoever else still looks at the old shape keeps that.
         Arc::make_mut(&mut self.posed).pose(&pose.joints, &pose.morph_weights);
+        let in_world = self.posed.is_in_world();
+        self.posed_before = before.filter(|&(_, space)| space == in_world).map(|(tick, _)| tick);
+        self.posed_at = tick;
     }
 }
 

@@ -9,8 +9,10 @@
 //! of the frame before, and a surface jumps from pose to pose: what it jumps across is not hit, as with surfaces that
 //! move as a whole. So what an animated surface is hit by depends on how ticks fall into frames, unlike all the rest.
 //!
-//! Marks and water stay where they came to be: they are kept by uv, and uv does not deform. What is measured on the mesh,
-//! such as area and slope of texels and where drops fall from, is still measured at rest.
+//! Marks and water stay where they came to be: they are kept by uv, and uv does not deform. A stamp that comes is carried back
+//! to the mesh at rest by the triangle it hit (`overlay/site.rs`); water runs by the slopes of the pose (`wetting/posed.rs`), and
+//! drips leave from where the surface is, as fast as its pose moves. Areas of texels and exposure are still those at rest, as
+//! the transform of the mesh's entity shows it.
 //!
 //! A mesh that has joints or morph targets, but is shown by an entity without [`SkinnedMesh`] or [`MeshMorphWeights`], is
 //! rigid; so is one with those components, but nothing to apply them to. A triangle without area at rest is never hit.

@@ -8,6 +8,7 @@ use bevy::mesh::skinning::{SkinnedMesh, SkinnedMeshInverseBindposes};
 use bevy::prelude::*;
 
 use super::DeformingCollider;
+use crate::clock::WeatheringClock;
 use crate::collision::CollisionScene;
 
 type Surface =
@@ -17,6 +18,7 @@ type SurfaceItem<'w, 's> = QueryItem<'w, 's, Surface>;
 /// Poses the surfaces whose joints or weights have changed. `update_collision_scene` has to follow: it puts them back into
 /// the scene, which forgets them here, so that they can change in place.
 pub(in crate::collision) fn pose_surfaces(
+    clock: Res<WeatheringClock>,
     mut scene: ResMut<CollisionScene>,
     bind_poses: Res<Assets<SkinnedMeshInverseBindposes>>,
     transforms: Query<&GlobalTransform>,
@@ -57,16 +59,18 @@ pub(in crate::collision) fn pose_surfaces(
     }
     // Not a change to those who look at what does not deform.
     scene.bypass_change_detection().forget_deforming();
+    let tick = clock.tick();
     if stale == 1 {
-        surfaces.iter_mut().for_each(pose_if_stale);
+        surfaces.iter_mut().for_each(|surface| pose_if_stale(surface, tick));
     } else {
-        surfaces.par_iter_mut().batching_strategy(BatchingStrategy::fixed(1)).for_each(pose_if_stale);
+        let each = surfaces.par_iter_mut().batching_strategy(BatchingStrategy::fixed(1));
+        each.for_each(|surface| pose_if_stale(surface, tick));
     }
 }
 
-fn pose_if_stale((mut collider, ..): SurfaceItem) {
+fn pose_if_stale((mut collider, ..): SurfaceItem, tick: u32) {
     if collider.is_stale() {
-        collider.take_pose();
+        collider.take_pose(tick);
     }
 }
 
@@ -96,6 +100,7 @@ mod tests {
             ComputeTaskPool::get_or_init(default);
             let mut world = World::new();
             world.init_resource::<CollisionScene>();
+            world.insert_resource(WeatheringClock::new(60));
             world.init_resource::<Assets<SkinnedMeshInverseBindposes>>();
             let mut schedule = Schedule::default();
             schedule.add_systems((attach_deforming, pose_surfaces, update_collision_scene).chain());
@@ -271,6 +276,44 @@ mod tests {
         stage.run();
         assert!(down(&stage, 11.5).is_none());
         assert!(down(&stage, -8.5).is_some_and(|hit| (hit.point.y + 1.0).abs() < 1e-5));
+    }
+
+    #[test]
+    fn places_move_as_fast_as_their_poses_until_these_rest_or_jump() {
+        let mut stage = Stage::new();
+        let at = GlobalTransform::from_xyz(10.0, 0.0, 0.0);
+        let surface = stage
+            .world
+            .spawn((SurfaceCollider(square()), MeshMorphWeights::Value { weights: vec![0.0] }, at))
+            .id();
+        // Goes on by so many ticks, with a pose of its own in the last.
+        let mut velocity = |ticks: u32, weights: Vec<f32>| {
+            for _ in 0..ticks {
+                stage.world.resource_mut::<WeatheringClock>().advance();
+            }
+            stage.world.entity_mut(surface).insert(MeshMorphWeights::Value { weights });
+            stage.run();
+            let collider = stage.world.get::<DeformingCollider>(surface).unwrap();
+            collider.velocity(0, [0.25, 0.5], stage.world.resource())
+        };
+        let near = |velocity: Vec3, expected: Vec3| {
+            assert!(velocity.distance(expected) < 1e-3, "{velocity} {expected}");
+        };
+        near(velocity(1, vec![0.25, 0.0]), Vec3::ZERO);
+        // Frames of two ticks, and a centimetre in each.
+        near(velocity(2, vec![0.26, 0.0]), Vec3::Y * 0.3);
+        near(velocity(1, vec![0.26, 0.0]), Vec3::Y * 0.3);
+        near(velocity(1, vec![0.26, 0.0]), Vec3::ZERO);
+        // Frames of a tick again; the first movement after a rest is taken for as slow as it may have been.
+        near(velocity(1, vec![0.27, 0.0]), Vec3::Y * 0.2);
+        near(velocity(1, vec![0.28, 0.0]), Vec3::Y * 0.6);
+        // It jumps, it is no number, and comes back from there.
+        near(velocity(1, vec![100.0, 0.0]), Vec3::ZERO);
+        near(velocity(1, vec![f32::NAN, 0.0]), Vec3::ZERO);
+        near(velocity(1, vec![0.5, 0.0]), Vec3::ZERO);
+        near(velocity(1, vec![0.51, 0.0]), Vec3::Y * 0.6);
+        // A long rest.
+        near(velocity(20, vec![0.52, 0.0]), Vec3::ZERO);
     }
 
     #[test]

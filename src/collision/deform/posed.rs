@@ -14,6 +14,8 @@ use crate::collision::{LocalHit, MeshBvh, MeshTriangles};
 pub struct PosedMesh {
     mesh: Arc<MeshBvh>,
     positions: Vec<Vec3>,
+    /// In the pose before.
+    previous: Vec<Vec3>,
     bvh: DeformingBvh,
     in_world: bool,
 }
@@ -23,13 +25,14 @@ impl PosedMesh {
     pub fn new(mesh: Arc<MeshBvh>) -> Option<Self> {
         let (deformer, rest) = mesh.deforming()?;
         let (positions, bvh) = (deformer.rest().to_vec(), rest.clone());
-        Some(Self { mesh, positions, bvh, in_world: false })
+        Some(Self { mesh, previous: positions.clone(), positions, bvh, in_world: false })
     }
 
     /// Takes a pose: joints and weights as [`Deformer::pose`](super::Deformer::pose) wants them. Nothing is allocated,
     /// unless the BVH has to be built anew or there are so many vertices that threads share them.
     pub fn pose(&mut self, joints: &[Affine3A], morph_weights: &[f32]) {
         let Some((deformer, _)) = self.mesh.deforming() else { return };
+        std::mem::swap(&mut self.positions, &mut self.previous);
         deformer.pose(joints, morph_weights, &mut self.positions);
         self.in_world = deformer.is_skinned() && !joints.is_empty();
         self.bvh.refit(&self.positions);
@@ -50,15 +53,31 @@ impl PosedMesh {
         self.mesh.triangles()
     }
 
+    /// The posed vertices.
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// The vertices of each triangle, in the order of [`Self::triangles`].
+    pub fn vertices(&self) -> &[[u32; 3]] {
+        self.mesh.deformer().map_or(&[][..], |deformer| &deformer.corners()[..])
+    }
+
     /// The posed corners of a triangle, by its index in [`Self::triangles`].
     ///
     /// # Panics
     /// If there is no such triangle.
     pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
-        match self.mesh.deformer() {
-            Some(deformer) => deformer.corners()[triangle].map(|vertex| self.positions[vertex as usize]),
-            None => self.mesh.triangles().positions[triangle],
-        }
+        self.vertices()[triangle].map(|vertex| self.positions[vertex as usize])
+    }
+
+    /// How far the corners of a triangle have come since the pose before this one; nonsense if that was in another space.
+    ///
+    /// # Panics
+    /// If there is no such triangle.
+    pub(super) fn moved(&self, triangle: usize) -> [Vec3; 3] {
+        let moved = |vertex: u32| self.positions[vertex as usize] - self.previous[vertex as usize];
+        self.vertices()[triangle].map(moved)
     }
 
     /// Smallest and largest corner of everything that can be hit; `None` if nothing can.
