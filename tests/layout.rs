@@ -226,9 +226,8 @@ fn the_constants_of_a_surface_are_read_as_they_are_written() {
         wet_translucency: 31.0,
         rain_mm_per_h: 32.0,
         ripple_cell: 33.0,
-        texel_metres: 34.0,
-        size: 35,
-        flags: 36,
+        size: 34,
+        flags: 35,
     };
     let floats = |values: &[f32]| (ScalarKind::Float, values.iter().map(|value| value.to_bits()).collect());
     let expected: Vec<(&str, (ScalarKind, Vec<u32>))> = vec![
@@ -259,9 +258,8 @@ fn the_constants_of_a_surface_are_read_as_they_are_written() {
         ("wet_translucency", floats(&[31.0])),
         ("rain_mm_per_h", floats(&[32.0])),
         ("ripple_cell", floats(&[33.0])),
-        ("texel_metres", floats(&[34.0])),
-        ("size", (ScalarKind::Uint, vec![35])),
-        ("flags", (ScalarKind::Uint, vec![36])),
+        ("size", (ScalarKind::Uint, vec![34])),
+        ("flags", (ScalarKind::Uint, vec![35])),
     ];
     let mut buffer = UniformBuffer::new(Vec::new());
     buffer.write(&written).unwrap();

@@ -60,8 +60,6 @@ struct PorousUniform {
     rain_mm_per_h: f32,
     // Side of the cells of that rain, metres.
     ripple_cell: f32,
-    // Side of a texel on the surface, metres.
-    texel_metres: f32,
     // Texels along each side of the maps.
     size: u32,
     // Sum of the FLAG_ constants.
@@ -285,8 +283,8 @@ fn heap_mm(texel: vec2<i32>) -> f32 {
     return depths.x + depths.y + depths.z;
 }
 
-// How fast what lies here falls along u and v: the slopes of its surface.
-fn heap_slopes(uv: vec2<f32>) -> vec2<f32> {
+// How fast what lies here falls, metres per unit of u and of v.
+fn heap_falls(uv: vec2<f32>) -> vec2<f32> {
     let position = uv * f32(porous.size) - 0.5;
     let corner = floor(position);
     let part = position - corner;
@@ -302,7 +300,7 @@ fn heap_slopes(uv: vec2<f32>) -> vec2<f32> {
         );
         sum += weight.x * weight.y * along;
     }
-    return sum / (2000.0 * porous.texel_metres);
+    return sum * f32(porous.size) / 2000.0;
 }
 
 // How wet the played map says a point is, 0..=1. Grey g wets at (1 - g)(1 - t_fill), 0 never; drying is that backwards.

@@ -22,7 +22,8 @@ pub struct Overlays {
     pub diffuse: Handle<Image>,
     /// Reflectance, smoothness, unused, coverage; `rgba8unorm`, premultiplied.
     pub specular: Handle<Image>,
-    /// Slope along u and v (0.5 is flat), unused, coverage; `rgba8unorm`, premultiplied.
+    /// Slope towards growing u and v (128 of 255 is flat), unused, coverage; `rgba8unorm`, premultiplied. See
+    /// [`normals`](crate::material::normals).
     pub normal: Handle<Image>,
     /// [`GpuTexelWater`] of each texel, tile by tile; a single one while nothing has been wet.
     pub state: Handle<ShaderBuffer>,
