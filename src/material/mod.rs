@@ -18,6 +18,7 @@ mod clock;
 mod exchange;
 mod extension;
 pub mod film;
+pub mod footprint;
 mod key;
 pub mod models;
 pub mod normals;
@@ -74,6 +75,7 @@ impl Plugin for PorousMaterialPlugin {
         load_shader_library!(app, "../../shaders/common/drying.wgsl");
         load_shader_library!(app, "../../shaders/common/matter.wgsl");
         load_shader_library!(app, "../../shaders/common/normals.wgsl");
+        load_shader_library!(app, "../../shaders/common/footprint.wgsl");
         load_shader_library!(app, "../../shaders/common/wet_map.wgsl");
         load_shader_library!(app, "../../shaders/common/wet_surface.wgsl");
         load_shader_library!(app, "../../shaders/common/wet_layers.wgsl");

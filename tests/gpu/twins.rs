@@ -2,6 +2,7 @@
 
 use bevy::math::{DVec2, DVec3};
 use bevy_weathering::material::film::{flood, layer, ripples};
+use bevy_weathering::material::footprint::axis_taps;
 use bevy_weathering::material::models::{authored, film_on_pores, lagarde, lekner_dorf, twomey};
 use bevy_weathering::material::normals::{self, Frame};
 use bevy_weathering::matter::look as matter;
@@ -10,7 +11,7 @@ use bevy_weathering::wetting::look;
 
 use super::harness;
 
-const SOURCES: [(&str, &str); 12] = [
+const SOURCES: [(&str, &str); 13] = [
     ("hnat.wgsl", include_str!("../../shaders/common/hnat.wgsl")),
     ("lagarde.wgsl", include_str!("../../shaders/common/lagarde.wgsl")),
     ("lekner_dorf.wgsl", include_str!("../../shaders/common/lekner_dorf.wgsl")),
@@ -23,6 +24,7 @@ const SOURCES: [(&str, &str); 12] = [
     ("drying.wgsl", include_str!("../../shaders/common/drying.wgsl")),
     ("matter.wgsl", include_str!("../../shaders/common/matter.wgsl")),
     ("normals.wgsl", include_str!("../../shaders/common/normals.wgsl")),
+    ("footprint.wgsl", include_str!("../../shaders/common/footprint.wgsl")),
 ];
 
 /// Random numbers of one input, each in `[0, 1)`.
@@ -37,6 +39,24 @@ struct Twin {
 }
 
 const TWINS: &[Twin] = &[
+    Twin {
+        // Exact in both precisions: it rounds down.
+        wgsl: "f32(footprint::axis_taps(floor(4096.0 * x[0]) * 0.00390625 - 8.0, floor(1024.0 * x[1]) * 0.00390625).low)",
+        rust: |x| {
+            f64::from(axis_taps((4096.0 * x[0]).floor() / 256.0 - 8.0, (1024.0 * x[1]).floor() / 256.0).low)
+        },
+    },
+    Twin {
+        // Exact in both precisions: it rounds down.
+        wgsl: "f32(footprint::axis_taps(floor(4096.0 * x[0]) * 0.00390625 - 8.0, floor(1024.0 * x[1]) * 0.00390625).high)",
+        rust: |x| {
+            f64::from(axis_taps((4096.0 * x[0]).floor() / 256.0 - 8.0, (1024.0 * x[1]).floor() / 256.0).high)
+        },
+    },
+    Twin {
+        wgsl: "footprint::axis_taps(0.6 + 0.8 * x[0], 5.0 * x[1]).part",
+        rust: |x| axis_taps(0.6 + 0.8 * x[0], 5.0 * x[1]).part,
+    },
     Twin {
         wgsl: "normals::surface_frame(normals::relief_normal(vec2(0.3, -0.2)), vec3(1.0 + x[0], x[1] - 0.5, x[2] - 0.5), vec3(x[3] - 0.5, 1.0 + x[4], 0.3), vec2(1.0 + x[5], x[6] - 0.5), vec2(x[7] - 0.5, 1.3)).along_v.x",
         rust: |x| frame(x, 1.3).along_v.x,
