@@ -4,8 +4,8 @@
 // the order of their impacts, and reads and writes its texel once. Edges of the map are a modulo in `kernel`.
 
 #import bevy_weathering::kernel::{
-    Axis, axis_offset, blend_over, cross_axes, depth_part, dot_axes, facing_part, falloff, framed, lay_stamp, slope_color, slope_of,
-    stamp_alpha, stamp_slope, turned, unpack_axis
+    Axis, axis_offset, blend_over, bytes_from_color, color_from_bytes, cross_axes, depth_part, dot_axes, facing_part, falloff, framed,
+    lay_stamp, slope_color, slope_of, stamp_alpha, stamp_slope, turned, unpack_axis
 }
 #import bevy_weathering::stamp::{StampTexel, STAMP_TEXELS, mix4, on_stamp, stamp_corners}
 
@@ -102,14 +102,6 @@ struct SurfaceBatch {
 @group(1) @binding(3) var<storage, read_write> rings: array<RainRing>;
 // A single one while nothing lies in space.
 @group(1) @binding(4) var<storage, read> frames: array<TexelFrame>;
-
-fn bytes_from_color(color: vec4<f32>) -> vec4<u32> {
-    return vec4<u32>(color * 255.0 + 0.5);
-}
-
-fn color_from_bytes(bytes: vec4<u32>) -> vec4<f32> {
-    return vec4<f32>(bytes) / 255.0;
-}
 
 // What a texel of the maps holds, as bytes.
 struct Painted {

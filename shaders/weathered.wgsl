@@ -13,36 +13,31 @@
 #import bevy_weathering::{
     wet_lighting::apply_wet_lighting,
     wet_map::{
-        porous, matter_look, heap_slopes, diffuse_map, specular_map, normal_map, map_sampler, surface_texture, surface_sampler,
+        porous, matter_look, heap_falls, diffuse_map, specular_map, normal_map, map_sampler, surface_texture, surface_sampler,
         wet_color_texture, wet_color_sampler,
     },
     wet_surface::{Water, apply_model, ripples, water_on},
     matter::{dust_color_over, matter_cover, roughness_under, snow_albedo},
+    normals::{Frame, faced, painted_slopes, relief_normal, relieved, reoriented, slopes_in_frame, surface_frame},
 }
 
 #ifdef VISIBILITY_RANGE_DITHER
 #import bevy_pbr::pbr_functions::visibility_range_dither
 #endif
 
-// Tilts a normal by slopes along the directions in which u and v grow.
-//
-// The directions come from screen-space derivatives of position and uv, so the mesh needs no tangents (Mikkelsen
-// 2010, "Bump mapping unparametrized surfaces on the GPU").
-fn tilt_normal(normal: vec3<f32>, slopes: vec2<f32>, dp_dx: vec3<f32>, dp_dy: vec3<f32>,
-               duv_dx: vec2<f32>, duv_dy: vec2<f32>) -> vec3<f32> {
-    let facing = sign(duv_dx.x * duv_dy.y - duv_dx.y * duv_dy.x);
-    let along_u = (dp_dx * duv_dy.y - dp_dy * duv_dx.y) * facing;
-    let along_v = (dp_dy * duv_dx.x - dp_dx * duv_dy.x) * facing;
-    let squares = vec2(dot(along_u, along_u), dot(along_v, along_v));
-    if squares.x == 0.0 || squares.y == 0.0 {
-        return normal;
-    }
-    let tilt = along_u * inverseSqrt(squares.x) * slopes.x + along_v * inverseSqrt(squares.y) * slopes.y;
-    return normalize(normal + tilt);
+// How uvs lie at a point. ground: the normal without any relief; relief: with the base normal map, which Bevy turns to the
+// viewer on a back face, while it may leave the other.
+fn frame_of(in: VertexOutput, ground: vec3<f32>, relief: vec3<f32>) -> Frame {
+    let normal = faced(normalize(ground), relief);
+#ifdef VERTEX_UVS_A
+    return surface_frame(normal, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz), dpdx(in.uv), dpdy(in.uv));
+#else
+    return Frame(vec3(0.0), vec3(0.0), normal, 0.0, vec2(0.0));
+#endif
 }
 
 // Colour, gloss and relief that fell on the surface, over its own.
-fn apply_paint(pbr: ptr<function, PbrInput>, in: VertexOutput) {
+fn apply_paint(pbr: ptr<function, PbrInput>, in: VertexOutput, frame: Frame) {
 #ifdef VERTEX_UVS_A
     let diffuse = textureSample(diffuse_map, map_sampler, in.uv);
     let base = (*pbr).material.base_color;
@@ -51,11 +46,8 @@ fn apply_paint(pbr: ptr<function, PbrInput>, in: VertexOutput) {
     (*pbr).material.reflectance = (*pbr).material.reflectance * (1.0 - specular.a) + specular.r;
     (*pbr).material.perceptual_roughness =
         (*pbr).material.perceptual_roughness * (1.0 - specular.a) + (specular.a - specular.g);
-    // Premultiplied around 0.5: no coverage is no slope.
-    let normal = textureSample(normal_map, map_sampler, in.uv);
-    let slopes = 2.0 * normal.rg - normal.a;
-    (*pbr).N = tilt_normal((*pbr).N, slopes, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz),
-        dpdx(in.uv), dpdy(in.uv));
+    let slopes = painted_slopes(textureSample(normal_map, map_sampler, in.uv));
+    (*pbr).N = relieved(frame, (*pbr).N, slopes);
 #endif
 }
 
@@ -101,10 +93,10 @@ fn apply_matter(pbr: ptr<function, PbrInput>, water: ptr<function, Water>) {
 
 #ifdef WEATHERED_LIGHT
 // The point with the water on it, lit.
-fn weathered_color(pbr_input: PbrInput, in: VertexOutput) -> vec4<f32> {
+fn weathered_color(pbr_input: PbrInput, in: VertexOutput, frame: Frame) -> vec4<f32> {
     var pbr = pbr_input;
     var water: Water;
-    var normal = normalize(pbr.world_normal);
+    var normal = frame.normal;
 #ifdef VERTEX_UVS_A
     let texture_uv = (pbr_bindings::material.uv_transform * vec3(in.uv, 1.0)).xy;
     var surface = vec4(1.0);
@@ -126,16 +118,17 @@ fn weathered_color(pbr_input: PbrInput, in: VertexOutput) -> vec4<f32> {
     apply_model(&pbr, &water, surface.r, wet_color * porous.wet_color);
 #ifdef WEATHERED_MATTER
     apply_matter(&pbr, &water);
-    let heaps = heap_slopes(in.uv);
-    normal = tilt_normal(normal, heaps, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz), dpdx(in.uv), dpdy(in.uv));
-    // What covers a relief evens it out.
-    pbr.N = normalize(mix(tilt_normal(pbr.N, heaps, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz), dpdx(in.uv), dpdy(in.uv)),
-        normal, matter_cover(water.matter.z, matter_look.flake_mm)));
+    let heaps = slopes_in_frame(frame, heap_falls(in.uv));
+    // What covers a relief evens it out; its own lies on what is left.
+    let evened = normalize(mix(pbr.N, normal, matter_cover(water.matter.z, matter_look.flake_mm)));
+    pbr.N = relieved(frame, evened, heaps);
+    normal = relieved(frame, normal, heaps);
 #endif
 #ifdef WEATHERED_STANDING
     let waves = ripples(in.uv, in.world_position.xyz, water.levelness);
-    normal = tilt_normal(normal, -waves.xy, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz), dpdx(in.uv), dpdy(in.uv));
-    normal = normalize(normal - vec3(waves.z, 0.0, waves.w));
+    normal = relieved(frame, normal, -waves.xy);
+    // Rain that is not simulated knows no uvs: its waves are those of level water, laid on this one.
+    normal = reoriented(normal.xzy, relief_normal(-waves.zw)).xzy;
 #endif
 #endif
     pbr.material.diffuse_transmission =
@@ -159,8 +152,9 @@ fn fragment(in: VertexOutput, @builtin(front_facing) is_front: bool) -> Fragment
     var pbr = pbr_input_from_standard_material(plain, is_front);
     pbr.material.base_color = alpha_discard(pbr.material, pbr.material.base_color);
     apply_decals(&pbr);
+    let frame = frame_of(in, pbr.world_normal, pbr.N);
 #ifdef WEATHERED_PAINT
-    apply_paint(&pbr, in);
+    apply_paint(&pbr, in, frame);
 #endif
 
     var out: FragmentOutput;
@@ -168,7 +162,7 @@ fn fragment(in: VertexOutput, @builtin(front_facing) is_front: bool) -> Fragment
         out.color = pbr.material.base_color;
     } else {
 #ifdef WEATHERED_LIGHT
-        out.color = weathered_color(pbr, in);
+        out.color = weathered_color(pbr, in, frame);
 #else
         out.color = apply_pbr_lighting(pbr);
 #endif

@@ -9,13 +9,14 @@ use bevy::math::{UVec2, Vec3};
 use bevy::render::render_resource::{ShaderType, encase::UniformBuffer};
 use bevy_weathering::material::{GpuDryingPoint, PorousUniform};
 use bevy_weathering::matter::GpuTexelMatter;
-use bevy_weathering::overlay::{RainRing, Splat, SurfaceBatch, TexelFrame, TileHeader};
+use bevy_weathering::overlay::{MipStep, RainRing, Splat, SurfaceBatch, TexelFrame, TileHeader};
 use bevy_weathering::particle::{GpuLook, GpuParticle};
 use bevy_weathering::stamps::StampTexel;
 use bevy_weathering::wetting::gpu::GpuTexelWater;
 use naga::{Expression, Literal, Module, ScalarKind, TypeInner};
 
 const SPLAT: &str = include_str!("../shaders/splat.wgsl");
+const MIPS: &str = include_str!("../shaders/mips.wgsl");
 const STAMP: &str = include_str!("../shaders/common/stamp.wgsl");
 const MATTER: &str = include_str!("../shaders/common/matter.wgsl");
 const PARTICLES: &str = include_str!("../shaders/particles.wgsl");
@@ -226,9 +227,8 @@ fn the_constants_of_a_surface_are_read_as_they_are_written() {
         wet_translucency: 31.0,
         rain_mm_per_h: 32.0,
         ripple_cell: 33.0,
-        texel_metres: 34.0,
-        size: 35,
-        flags: 36,
+        size: 34,
+        flags: 35,
     };
     let floats = |values: &[f32]| (ScalarKind::Float, values.iter().map(|value| value.to_bits()).collect());
     let expected: Vec<(&str, (ScalarKind, Vec<u32>))> = vec![
@@ -259,9 +259,8 @@ fn the_constants_of_a_surface_are_read_as_they_are_written() {
         ("wet_translucency", floats(&[31.0])),
         ("rain_mm_per_h", floats(&[32.0])),
         ("ripple_cell", floats(&[33.0])),
-        ("texel_metres", floats(&[34.0])),
-        ("size", (ScalarKind::Uint, vec![35])),
-        ("flags", (ScalarKind::Uint, vec![36])),
+        ("size", (ScalarKind::Uint, vec![34])),
+        ("flags", (ScalarKind::Uint, vec![35])),
     ];
     let mut buffer = UniformBuffer::new(Vec::new());
     buffer.write(&written).unwrap();
@@ -314,4 +313,17 @@ fn a_batch_is_read_as_it_is_written() {
     let read: Vec<_> = fields.iter().map(|field| (field.name.as_str(), field.offset)).collect();
     assert_eq!(read, [("size", 0), ("first_tile", 4), ("clamped", 8)]);
     assert_eq!(u64::from(size), SurfaceBatch::min_size().get());
+}
+
+#[test]
+fn a_mip_step_is_read_as_it_is_written() {
+    let written = MipStep { size: 1, first_tile: 2, first_word: 3, masked: 4 };
+    let mut buffer = UniformBuffer::new(Vec::<u8>::new());
+    buffer.write(&written).expect("a vector holds anything");
+    let words: &[u32] = bytemuck::cast_slice(buffer.as_ref());
+    assert_eq!(words, [1, 2, 3, 4]);
+    let Layout { fields, size } = wgsl_layout(MIPS, "MipStep");
+    let read: Vec<_> = fields.iter().map(|field| (field.name.as_str(), field.offset)).collect();
+    assert_eq!(read, [("size", 0), ("first_tile", 4), ("first_word", 8), ("masked", 12)]);
+    assert_eq!(u64::from(size), MipStep::min_size().get());
 }

@@ -19,6 +19,8 @@ mod gpu {
     mod hnat;
     /// What must look the same, and what must not.
     mod images;
+    /// Maps from afar.
+    mod mips;
     /// Lights, cameras, meshes.
     mod places;
     /// Painting.

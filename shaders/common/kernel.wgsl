@@ -5,6 +5,15 @@
 
 const SUBTEXELS: i32 = 256;
 
+// What a texel of an 8-bit map holds, 0..=255 a channel.
+fn bytes_from_color(color: vec4<f32>) -> vec4<u32> {
+    return vec4<u32>(color * 255.0 + 0.5);
+}
+
+fn color_from_bytes(bytes: vec4<u32>) -> vec4<f32> {
+    return vec4<f32>(bytes) / 255.0;
+}
+
 // Where a stamp lies along one axis; 1/256 texel.
 struct Axis {
     // Middle of the stamp.

@@ -3,6 +3,7 @@
 #define_import_path bevy_weathering::wet_map
 
 #import bevy_weathering::drying::{Amounts, evolve, water_look}
+#import bevy_weathering::footprint::axis_taps
 #import bevy_weathering::hnat::wet_tau
 #import bevy_weathering::matter::{TexelMatter, matter_depths, settled_soil}
 #import bevy_weathering::ripples::{ring_slope, RING_SECONDS}
@@ -60,8 +61,6 @@ struct PorousUniform {
     rain_mm_per_h: f32,
     // Side of the cells of that rain, metres.
     ripple_cell: f32,
-    // Side of a texel on the surface, metres.
-    texel_metres: f32,
     // Texels along each side of the maps.
     size: u32,
     // Sum of the FLAG_ constants.
@@ -264,15 +263,15 @@ fn mix_held(a: Held, b: Held, part: f32) -> Held {
     return Held(mix(a.look, b.look, part), mix(a.marks, b.marks, part), mix(a.matter, b.matter, part));
 }
 
-// What a point holds and how it looks now; bilinear between texels.
+// What a point holds and how it looks now; bilinear between texels, spread over the pixel where it covers more of them.
 fn held_at(uv: vec2<f32>) -> Held {
-    let position = uv * f32(porous.size) - 0.5;
-    let corner = floor(position);
-    let part = position - corner;
-    let texel = vec2<i32>(corner);
-    let upper = mix_held(texel_held(texel), texel_held(texel + vec2(1, 0)), part.x);
-    let lower = mix_held(texel_held(texel + vec2(0, 1)), texel_held(texel + vec2(1, 1)), part.x);
-    return mix_held(upper, lower, part.y);
+    let size = f32(porous.size);
+    let covered = fwidth(uv) * size;
+    let u = axis_taps(uv.x * size, covered.x);
+    let v = axis_taps(uv.y * size, covered.y);
+    let upper = mix_held(texel_held(vec2(u.low, v.low)), texel_held(vec2(u.high, v.low)), u.part);
+    let lower = mix_held(texel_held(vec2(u.low, v.high)), texel_held(vec2(u.high, v.high)), u.part);
+    return mix_held(upper, lower, v.part);
 }
 
 // Depth of snow and soil at a texel, mm, for slopes.
@@ -285,24 +284,26 @@ fn heap_mm(texel: vec2<i32>) -> f32 {
     return depths.x + depths.y + depths.z;
 }
 
-// How fast what lies here falls along u and v: the slopes of its surface.
-fn heap_slopes(uv: vec2<f32>) -> vec2<f32> {
-    let position = uv * f32(porous.size) - 0.5;
-    let corner = floor(position);
-    let part = position - corner;
-    let texel = vec2<i32>(corner);
+// How fast what lies here falls, metres per unit of u and of v.
+fn heap_falls(uv: vec2<f32>) -> vec2<f32> {
+    let size = f32(porous.size);
+    let covered = fwidth(uv) * size;
+    let u = axis_taps(uv.x * size, covered.x);
+    let v = axis_taps(uv.y * size, covered.y);
+    // Where a pixel covers many texels, falls over as many of them.
+    let reach = max(vec2<i32>(0.5 * min(covered, vec2(size))), vec2(1));
     var sum = vec2(0.0);
     for (var i = 0; i < 4; i += 1) {
-        let step = vec2(i % 2, i / 2);
-        let at = texel + step;
-        let weight = select(1.0 - part, part, vec2<bool>(step));
+        let is_high = vec2(i % 2 == 1, i / 2 == 1);
+        let at = select(vec2(u.low, v.low), vec2(u.high, v.high), is_high);
+        let weight = select(1.0 - vec2(u.part, v.part), vec2(u.part, v.part), is_high);
         let along = vec2(
-            heap_mm(at - vec2(1, 0)) - heap_mm(at + vec2(1, 0)),
-            heap_mm(at - vec2(0, 1)) - heap_mm(at + vec2(0, 1)),
+            heap_mm(at - vec2(reach.x, 0)) - heap_mm(at + vec2(reach.x, 0)),
+            heap_mm(at - vec2(0, reach.y)) - heap_mm(at + vec2(0, reach.y)),
         );
-        sum += weight.x * weight.y * along;
+        sum += weight.x * weight.y * along / vec2<f32>(reach);
     }
-    return sum / (2000.0 * porous.texel_metres);
+    return sum * size / 2000.0;
 }
 
 // How wet the played map says a point is, 0..=1. Grey g wets at (1 - g)(1 - t_fill), 0 never; drying is that backwards.

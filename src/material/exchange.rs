@@ -21,7 +21,6 @@ pub struct DryMaterial(pub Handle<StandardMaterial>);
 
 type Surface = (
     &'static Overlays,
-    &'static TexelArea,
     &'static SurfaceTraces,
     Option<&'static PorousMaterial>,
     Option<&'static StandingWater>,
@@ -36,14 +35,15 @@ type Edited = Or<(
     Changed<WettingTextures>,
     Changed<PlayedWetMap>,
     Changed<Overlays>,
-    Changed<TexelArea>,
     Changed<SurfaceTraces>,
 )>;
 
+/// Before its texels are measured nothing can hit a surface, so there is nothing to show on it.
+type Hittable = (With<Weatherable>, With<TexelArea>);
+
 fn extension(
-    (maps, areas, traces, porous, standing, textures, played): (
+    (maps, traces, porous, standing, textures, played): (
         &Overlays,
-        &TexelArea,
         &SurfaceTraces,
         Option<&PorousMaterial>,
         Option<&StandingWater>,
@@ -60,7 +60,6 @@ fn extension(
         standing: standing.copied(),
         textures: textures.unwrap_or(&none),
         maps,
-        areas,
         played,
         hz: clock.hz(),
         traces: *traces,
@@ -90,7 +89,7 @@ pub(super) fn exchange_materials(
     deferred_cameras: Query<(), With<DeferredPrepass>>,
     standard: Res<Assets<StandardMaterial>>,
     mut weathered: ResMut<Assets<WeatheredMaterial>>,
-    new: Query<(Entity, Surface, &MeshMaterial3d<StandardMaterial>), With<Weatherable>>,
+    new: Query<(Entity, Surface, &MeshMaterial3d<StandardMaterial>), Hittable>,
 ) {
     for (entity, surface, material) in &new {
         let Some(dry) = standard.get(material) else { continue };

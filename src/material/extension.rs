@@ -130,7 +130,6 @@ pub struct PorousUniform {
     pub wet_translucency: f32,
     pub rain_mm_per_h: f32,
     pub ripple_cell: f32,
-    pub texel_metres: f32,
     pub size: u32,
     pub flags: u32,
 }

@@ -6,6 +6,9 @@
 //! and pore depth depend on where the light stands. A separate, nearly mirror-like lobe is the water in the pores. Lights,
 //! shadows, clusters, fog and the environment map are Bevy's own.
 //!
+//! What lies on a surface, and the waves of water, lean over its own normal map by reoriented normal mapping ([`normals`],
+//! which tells the conventions of normal maps, too).
+//!
 //! With porosity 0 or where nothing is wet, a surface looks as its `StandardMaterial` does.
 //!
 //! Not here: transmission, contact shadows, and screen-space reflections on weathered surfaces; deferred rendering
@@ -15,8 +18,10 @@ mod clock;
 mod exchange;
 mod extension;
 pub mod film;
+pub mod footprint;
 mod key;
 pub mod models;
+pub mod normals;
 mod played;
 mod porous;
 mod ranges;
@@ -69,6 +74,8 @@ impl Plugin for PorousMaterialPlugin {
         load_shader_library!(app, "../../shaders/common/ripples.wgsl");
         load_shader_library!(app, "../../shaders/common/drying.wgsl");
         load_shader_library!(app, "../../shaders/common/matter.wgsl");
+        load_shader_library!(app, "../../shaders/common/normals.wgsl");
+        load_shader_library!(app, "../../shaders/common/footprint.wgsl");
         load_shader_library!(app, "../../shaders/common/wet_map.wgsl");
         load_shader_library!(app, "../../shaders/common/wet_surface.wgsl");
         load_shader_library!(app, "../../shaders/common/wet_layers.wgsl");

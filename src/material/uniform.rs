@@ -7,7 +7,7 @@ use super::{
     BaseBrdf, Coated, Flood, PlayedWetMap, Playing, PorositySource, PorousKey, PorousMaterial, PorousUniform,
     StandingWater, TextureMeaning, WettingModel, WettingTextures,
 };
-use crate::overlay::{Overlays, SurfaceTraces, TexelArea, Wrap};
+use crate::overlay::{Overlays, SurfaceTraces, Wrap};
 
 impl PorousUniform {
     /// [`Pores::sqrt_k`](super::Pores::sqrt_k).
@@ -43,7 +43,6 @@ pub(super) struct SurfaceLook<'a> {
     /// Ticks per second.
     pub(super) hz: u32,
     pub(super) maps: &'a Overlays,
-    pub(super) areas: &'a TexelArea,
     pub(super) traces: SurfaceTraces,
 }
 
@@ -67,10 +66,9 @@ impl SurfaceLook<'_> {
 
     /// The constants, with every value brought into its range.
     pub(super) fn uniform(&self) -> PorousUniform {
-        let Self { porous, standing, maps, areas, .. } = self;
+        let Self { porous, standing, maps, .. } = self;
         let standing = standing.unwrap_or_default();
         let flag = |set: bool, flag: u32| if set { flag } else { 0 };
-        let texel_mm2 = areas.mean_mm2;
         let matter = porous.matter();
         let mut uniform = PorousUniform {
             absorption_per_mm: Vec3::from_array(standing.absorption_per_mm).max(Vec3::ZERO),
@@ -85,7 +83,6 @@ impl SurfaceLook<'_> {
             wet_translucency: porous.wet_translucency.clamp(0.0, 1.0),
             rain_mm_per_h: standing.rain_mm_per_h.max(0.0),
             ripple_cell: standing.ripple_cell.max(1e-3),
-            texel_metres: texel_mm2.sqrt() * 1e-3,
             size: maps.size,
             flags: flag(porous.texture == TextureMeaning::Solid, PorousUniform::FLAG_SOLID)
                 | flag(porous.brdf == BaseBrdf::BlinnPhong, PorousUniform::FLAG_BLINN_PHONG)

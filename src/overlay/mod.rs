@@ -7,7 +7,7 @@
 //! Two painters do the same arithmetic, in integers, so that they agree to the bit: a compute pass
 //! ([`GpuOverlayPlugin`]) that sorts splats into tiles and visits each touched texel once, and a plain loop over
 //! splats ([`CpuOverlayPlugin`]) for runs without a renderer and as the reference for tests. The arithmetic is
-//! in [`kernel`], with a WGSL twin.
+//! in [`kernel`], with a WGSL twin. What is drawn has mip maps: what was painted is halved, level by level (`mips.rs`).
 //!
 //! # Wraparound
 //! A stamp over the edge of the map continues at the opposite edge ([`Wrap::Repeat`]) or ends there
@@ -20,6 +20,7 @@ mod frames;
 mod gpu;
 pub mod kernel;
 mod maps;
+mod mips;
 mod site;
 mod splat;
 mod stamping;
@@ -34,9 +35,10 @@ pub(crate) use deposit::measure_texels;
 pub use deposit::{DepositPlugin, PrepareStamps, SplatQueue, SurfaceTotals, SurfaceTraces, deposit_splats};
 pub(crate) use frames::FramesWork;
 pub use frames::{SurfaceFrames, TexelFrame};
-pub use gpu::{GpuOverlayPlugin, Overlays, SplatStats, SurfaceBatch};
+pub use gpu::{GpuOverlayPlugin, MipStep, Overlays, SplatStats, SurfaceBatch};
 pub(crate) use maps::Footprint;
 pub use maps::{RainRing, TexelArea, TexelAreas};
+pub use mips::{Lying, mip_chain, mip_levels};
 pub use splat::Splat;
 pub use tiles::{TILE_SIZE, TileBins, TileHeader};
 

@@ -11,7 +11,9 @@ use crate::clock::WeatheringClock;
 use crate::effect::EffectTable;
 use crate::emitter::{EmissionSeed, EmitterState, NewParticles};
 use crate::matter::SurfaceMatter;
-use crate::overlay::{CpuMaps, Overlays, SurfaceTotals, SurfaceTraces, Weatherable};
+use crate::overlay::{
+    CpuMaps, Lying, Overlays, SurfaceFrames, SurfaceTotals, SurfaceTraces, Weatherable, mip_chain,
+};
 use crate::particle::Particles;
 use crate::scenario::{Digest, LoadedScenario, check_weather};
 use crate::weather::DryingClock;
@@ -122,6 +124,7 @@ impl SavedScene {
             *matter = saved.matter.clone();
         }
         if let Some(mut overlays) = world.get::<Overlays>(entity).cloned() {
+            let lying = world.get::<SurfaceFrames>(entity).map(Lying::new);
             let mut images = world.resource_mut::<Assets<Image>>();
             for (handle, bytes) in [
                 (&mut overlays.diffuse, &saved.colors.diffuse),
@@ -129,7 +132,9 @@ impl SavedScene {
                 (&mut overlays.normal, &saved.colors.normal),
             ] {
                 let Some(mut image) = images.get(&*handle).cloned() else { continue };
-                image.data = Some(bytes.clone());
+                // A texture with data needs that of its mip maps, too.
+                let levels = mip_chain(bytes.as_chunks::<4>().0, overlays.size, lying.as_ref());
+                image.data = Some([bytes.as_slice(), levels.concat().as_flattened()].concat());
                 image.asset_usage = RenderAssetUsages::RENDER_WORLD;
                 *handle = images.add(image);
             }

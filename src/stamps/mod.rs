@@ -12,7 +12,8 @@
 //! **Slopes** lean the way a normal does, downhill: 128 is flat, and 127 more is a fall by 1 for every 1 towards +u
 //! (to the right) or +v (down the image); so it is `128 - 127 dh/du`. It is the convention of
 //! [`slope_color`](crate::overlay::kernel::slope_color), where a raised dome is above 128 on its right, and of
-//! `apply_paint` in `shaders/weathered.wgsl`, which adds the slopes to the normal. **Heights** are 255 at
+//! [`painted_slopes`](crate::material::normals::painted_slopes), which reads them back to be laid on the surface's own normal:
+//! green as DirectX has it, not as base normal maps do in Bevy. **Heights** are 255 at
 //! [`StampKind::relief`], which is in radii of the stamp: half its side. So a stamp has the same slopes at any size.
 //!
 //! [`stamps()`] makes the variants of a kind side by side in a strip, and [`write_stamps`] keeps them in files. A

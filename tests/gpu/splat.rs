@@ -12,10 +12,10 @@ use bevy_weathering::stamps::StampKind;
 
 use super::app::{app, read_back, update, update_until};
 
-const SIZE: u32 = 128;
+pub(super) const SIZE: u32 = 128;
 
 /// Splats all over the map, many across its edges, of all sizes up to the map's.
-fn random_splats(count: u32, mut seed: u64) -> Vec<Splat> {
+pub(super) fn random_splats(count: u32, mut seed: u64) -> Vec<Splat> {
     let mut next = |below: u32| {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((seed >> 33) as u32) % below
@@ -42,11 +42,11 @@ fn random_splats(count: u32, mut seed: u64) -> Vec<Splat> {
         .collect()
 }
 
-fn spawn_surface(app: &mut App, surface: Weatherable) -> Entity {
+pub(super) fn spawn_surface(app: &mut App, surface: Weatherable) -> Entity {
     app.world_mut().spawn(surface).id()
 }
 
-fn push(app: &mut App, entity: Entity, splats: &[Splat]) {
+pub(super) fn push(app: &mut App, entity: Entity, splats: &[Splat]) {
     let mut queue = app.world_mut().get_mut::<SplatQueue>(entity).unwrap();
     splats.iter().for_each(|&splat| queue.push(splat));
 }
@@ -71,7 +71,7 @@ fn maps_of(app: &mut App, entity: Entity, surface: &Weatherable) -> CpuMaps {
     }
 }
 
-fn painted(app: &mut App, splats: u64) {
+pub(super) fn painted(app: &mut App, splats: u64) {
     update_until(app, "the splats to be painted", |world| world.resource::<SplatStats>().splats() >= splats);
 }
 

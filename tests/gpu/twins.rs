@@ -1,14 +1,17 @@
-//! Wet models, films, floods and ripples: every function of the shaders against its double-precision twin.
+//! Wet models, films, floods, ripples and reliefs: every function of the shaders against its double-precision twin.
 
+use bevy::math::{DVec2, DVec3};
 use bevy_weathering::material::film::{flood, layer, ripples};
+use bevy_weathering::material::footprint::axis_taps;
 use bevy_weathering::material::models::{authored, film_on_pores, lagarde, lekner_dorf, twomey};
+use bevy_weathering::material::normals::{self, Frame};
 use bevy_weathering::matter::look as matter;
 use bevy_weathering::wetting::evolve::{Amounts, Matter, evolve};
 use bevy_weathering::wetting::look;
 
 use super::harness;
 
-const SOURCES: [(&str, &str); 11] = [
+const SOURCES: [(&str, &str); 13] = [
     ("hnat.wgsl", include_str!("../../shaders/common/hnat.wgsl")),
     ("lagarde.wgsl", include_str!("../../shaders/common/lagarde.wgsl")),
     ("lekner_dorf.wgsl", include_str!("../../shaders/common/lekner_dorf.wgsl")),
@@ -20,6 +23,8 @@ const SOURCES: [(&str, &str); 11] = [
     ("ripples.wgsl", include_str!("../../shaders/common/ripples.wgsl")),
     ("drying.wgsl", include_str!("../../shaders/common/drying.wgsl")),
     ("matter.wgsl", include_str!("../../shaders/common/matter.wgsl")),
+    ("normals.wgsl", include_str!("../../shaders/common/normals.wgsl")),
+    ("footprint.wgsl", include_str!("../../shaders/common/footprint.wgsl")),
 ];
 
 /// Random numbers of one input, each in `[0, 1)`.
@@ -34,6 +39,83 @@ struct Twin {
 }
 
 const TWINS: &[Twin] = &[
+    Twin {
+        // Exact in both precisions: it rounds down.
+        wgsl: "f32(footprint::axis_taps(floor(4096.0 * x[0]) * 0.00390625 - 8.0, floor(1024.0 * x[1]) * 0.00390625).low)",
+        rust: |x| {
+            f64::from(axis_taps((4096.0 * x[0]).floor() / 256.0 - 8.0, (1024.0 * x[1]).floor() / 256.0).low)
+        },
+    },
+    Twin {
+        // Exact in both precisions: it rounds down.
+        wgsl: "f32(footprint::axis_taps(floor(4096.0 * x[0]) * 0.00390625 - 8.0, floor(1024.0 * x[1]) * 0.00390625).high)",
+        rust: |x| {
+            f64::from(axis_taps((4096.0 * x[0]).floor() / 256.0 - 8.0, (1024.0 * x[1]).floor() / 256.0).high)
+        },
+    },
+    Twin {
+        wgsl: "footprint::axis_taps(0.6 + 0.8 * x[0], 5.0 * x[1]).part",
+        rust: |x| axis_taps(0.6 + 0.8 * x[0], 5.0 * x[1]).part,
+    },
+    Twin {
+        wgsl: "normals::surface_frame(normals::relief_normal(vec2(0.3, -0.2)), vec3(1.0 + x[0], x[1] - 0.5, x[2] - 0.5), vec3(x[3] - 0.5, 1.0 + x[4], 0.3), vec2(1.0 + x[5], x[6] - 0.5), vec2(x[7] - 0.5, 1.3)).along_v.x",
+        rust: |x| frame(x, 1.3).along_v.x,
+    },
+    Twin {
+        wgsl: "normals::slopes_in_frame(normals::surface_frame(normals::relief_normal(vec2(0.3, -0.2)), vec3(1.0 + x[0], x[1] - 0.5, x[2] - 0.5), vec3(x[3] - 0.5, 1.0 + x[4], 0.3), vec2(1.0 + x[5], x[6] - 0.5), vec2(x[7] - 0.5, 1.3)), vec2(x[1], x[2])).y",
+        rust: |x| normals::slopes_in_frame(frame(x, 1.3), DVec2::new(x[1], x[2])).y,
+    },
+    Twin {
+        wgsl: "normals::relieved(normals::surface_frame(normals::relief_normal(vec2(0.3, -0.2)), vec3(1.0 + x[0], x[1] - 0.5, x[2] - 0.5), vec3(x[3] - 0.5, 1.0 + x[4], 0.3), vec2(1.0 + x[5], x[6] - 0.5), vec2(x[7] - 0.5, 1.3)), normals::relief_normal(vec2(x[1], x[2])), vec2(x[3], -x[4])).y",
+        rust: |x| normals::relieved(frame(x, 1.3), leaning(x[1], x[2]), DVec2::new(x[3], -x[4])).y,
+    },
+    Twin {
+        wgsl: "normals::surface_frame(normals::relief_normal(vec2(0.3, -0.2)), vec3(1.0 + x[0], x[1] - 0.5, x[2] - 0.5), vec3(x[3] - 0.5, 1.0 + x[4], 0.3), vec2(1.0 + x[5], x[6] - 0.5), vec2(x[7] - 0.5, -1.3)).along_v.x",
+        rust: |x| frame(x, -1.3).along_v.x,
+    },
+    Twin {
+        wgsl: "normals::slopes_in_frame(normals::surface_frame(normals::relief_normal(vec2(0.3, -0.2)), vec3(1.0 + x[0], x[1] - 0.5, x[2] - 0.5), vec3(x[3] - 0.5, 1.0 + x[4], 0.3), vec2(1.0 + x[5], x[6] - 0.5), vec2(x[7] - 0.5, -1.3)), vec2(x[1], x[2])).y",
+        rust: |x| normals::slopes_in_frame(frame(x, -1.3), DVec2::new(x[1], x[2])).y,
+    },
+    Twin {
+        wgsl: "normals::relieved(normals::surface_frame(normals::relief_normal(vec2(0.3, -0.2)), vec3(1.0 + x[0], x[1] - 0.5, x[2] - 0.5), vec3(x[3] - 0.5, 1.0 + x[4], 0.3), vec2(1.0 + x[5], x[6] - 0.5), vec2(x[7] - 0.5, -1.3)), normals::relief_normal(vec2(x[1], x[2])), vec2(x[3], -x[4])).y",
+        rust: |x| normals::relieved(frame(x, -1.3), leaning(x[1], x[2]), DVec2::new(x[3], -x[4])).y,
+    },
+    Twin {
+        wgsl: "normals::reoriented(normals::relief_normal(vec2(6.0 * x[0] - 3.0, 6.0 * x[1] - 3.0)), normals::relief_normal(vec2(6.0 * x[2] - 3.0, 6.0 * x[3] - 3.0))).x",
+        rust: |x| reoriented(x).x,
+    },
+    Twin {
+        wgsl: "normals::reoriented(normals::relief_normal(vec2(6.0 * x[0] - 3.0, 6.0 * x[1] - 3.0)), normals::relief_normal(vec2(6.0 * x[2] - 3.0, 6.0 * x[3] - 3.0))).z",
+        rust: |x| reoriented(x).z,
+    },
+    Twin {
+        // What is flat changes nothing: the distance is 0, on either side.
+        wgsl: "x[2] + length(normals::reoriented(normals::relief_normal(vec2(x[0], x[1])), vec3(0.0, 0.0, 1.0)) - normals::relief_normal(vec2(x[0], x[1])))",
+        rust: |x| x[2],
+    },
+    Twin {
+        wgsl: "x[2] + length(normals::reoriented(vec3(0.0, 0.0, 1.0), normals::relief_normal(vec2(x[0], x[1]))) - normals::relief_normal(vec2(x[0], x[1])))",
+        rust: |x| x[2],
+    },
+    Twin {
+        // A unit vector also where the base looks away.
+        wgsl: "x[4] * length(normals::reoriented(normalize(vec3(x[0] - 0.5, x[1] - 0.5, x[5] - 0.6)), normals::relief_normal(vec2(x[2], x[3]))))",
+        rust: |x| x[4],
+    },
+    Twin {
+        wgsl: "normals::painted_slopes(vec4(x[0], x[1], 0.0, x[2])).y",
+        rust: |x| normals::painted_slopes([x[0], x[1], x[2]]).y,
+    },
+    Twin {
+        wgsl: "normals::faced(vec3(x[0], x[1], 0.3), vec3(x[2], x[3] - 0.8, 0.0)).x * f32(abs(x[0] * x[2] + x[1] * (x[3] - 0.8)) > 1e-4)",
+        rust: |x| {
+            // A step: near it single precision decides otherwise.
+            let away = (x[0] * x[2] + x[1] * (x[3] - 0.8)).abs() > 1e-4;
+            let faced = normals::faced(DVec3::new(x[0], x[1], 0.3), DVec3::new(x[2], x[3] - 0.8, 0.0));
+            faced.x * f64::from(u8::from(away))
+        },
+    },
     Twin {
         wgsl: "matter::matter_cover(0.2 * x[0], 0.01 + 0.1 * x[1])",
         rust: |x| matter::matter_cover(0.2 * x[0], 0.01 + 0.1 * x[1]),
@@ -198,6 +280,26 @@ fn evolved(x: &[f64; NUMBERS]) -> Amounts {
     let before = Amounts { film_mm: x[0], pores_mm: x[1], reserve_mm: 0.2 * x[2] };
     let matter = Matter { sorptivity_squared: x[3] * x[3], capacity_mm: 0.1 + 2.0 * x[4] };
     evolve(before, matter, 4.0 * x[5], 2.0 * x[6])
+}
+
+fn leaning(u: f64, v: f64) -> DVec3 {
+    normals::relief_normal(DVec2::new(u, v))
+}
+
+fn reoriented(x: &[f64; NUMBERS]) -> DVec3 {
+    let leaning = |u: f64, v: f64| leaning(6.0 * u - 3.0, 6.0 * v - 3.0);
+    normals::reoriented(leaning(x[0], x[1]), leaning(x[2], x[3]))
+}
+
+/// Of a surface that the screen looks at askew; `v`: how v changes down the screen.
+fn frame(x: &[f64; NUMBERS], v: f64) -> Frame {
+    normals::surface_frame(
+        leaning(0.3, -0.2),
+        DVec3::new(1.0 + x[0], x[1] - 0.5, x[2] - 0.5),
+        DVec3::new(x[3] - 0.5, 1.0 + x[4], 0.3),
+        DVec2::new(1.0 + x[5], x[6] - 0.5),
+        DVec2::new(x[7] - 0.5, v),
+    )
 }
 
 fn inputs() -> Vec<[f32; NUMBERS]> {

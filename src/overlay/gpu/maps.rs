@@ -7,10 +7,11 @@ use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat, T
 use bevy::render::storage::ShaderBuffer;
 
 use crate::matter::GpuTexelMatter;
-use crate::overlay::{RainRing, TILE_SIZE, Weatherable, Wrap};
+use crate::overlay::{RainRing, TILE_SIZE, Weatherable, Wrap, mip_levels};
 use crate::wetting::gpu::GpuTexelWater;
 
-/// The maps of a surface on the GPU. Begin empty; all zeros mean "nothing here".
+/// The maps of a surface on the GPU. Begin empty; all zeros mean "nothing here". The three images have
+/// [`mip_levels`] levels, which follow what is painted.
 #[derive(Component, Reflect, Debug, Clone)]
 #[reflect(Component)]
 pub struct Overlays {
@@ -22,7 +23,8 @@ pub struct Overlays {
     pub diffuse: Handle<Image>,
     /// Reflectance, smoothness, unused, coverage; `rgba8unorm`, premultiplied.
     pub specular: Handle<Image>,
-    /// Slope along u and v (0.5 is flat), unused, coverage; `rgba8unorm`, premultiplied.
+    /// Slope towards growing u and v (128 of 255 is flat), unused, coverage; `rgba8unorm`, premultiplied. See
+    /// [`normals`](crate::material::normals).
     pub normal: Handle<Image>,
     /// [`GpuTexelWater`] of each texel, tile by tile; a single one while nothing has been wet.
     pub state: Handle<ShaderBuffer>,
@@ -73,6 +75,7 @@ fn overlay_image(size: u32, wrap: [Wrap; 2], name: &'static str) -> Image {
     );
     image.texture_descriptor.label = Some(name);
     image.texture_descriptor.usage |= TextureUsages::STORAGE_BINDING;
+    image.texture_descriptor.mip_level_count = mip_levels(size);
     let [address_mode_u, address_mode_v] = wrap.map(|wrap| match wrap {
         Wrap::Repeat => ImageAddressMode::Repeat,
         Wrap::Clamp => ImageAddressMode::ClampToEdge,

@@ -3,9 +3,11 @@
 //! Main world: every surface gets textures and buffers ([`Overlays`]). Extract moves the waiting splats over
 //! (each exactly once, however many ticks the frame held). Prepare sorts them into tiles and uploads them; until
 //! the pipeline and the maps exist, they wait. The pass dispatches one workgroup per touched tile: a surface
-//! without new splats costs nothing, which [`SplatStats`] shows.
+//! without new splats costs nothing, which [`SplatStats`] shows. Then the touched tiles are halved into the mip maps of the
+//! colour maps (`mips.rs`).
 
 mod maps;
+mod mips;
 mod pass;
 mod prepare;
 
@@ -20,6 +22,7 @@ use super::SplatQueue;
 use super::deposit::note_traces;
 
 pub use maps::Overlays;
+pub use mips::MipStep;
 pub use prepare::{SplatStats, SurfaceBatch};
 
 /// Paints splats with a compute pass. Needs a render app; without one it throws splats away. To keep what falls there,
@@ -35,6 +38,7 @@ impl Plugin for GpuOverlayPlugin {
         load_shader_library!(app, "../../../shaders/common/kernel.wgsl");
         load_shader_library!(app, "../../../shaders/common/stamp.wgsl");
         embedded_asset!(app, "../../../shaders/splat.wgsl");
+        embedded_asset!(app, "../../../shaders/mips.wgsl");
 
         let stats = SplatStats::default();
         app.insert_resource(stats.clone()).add_systems(PreUpdate, maps::add_overlays);
@@ -45,7 +49,8 @@ impl Plugin for GpuOverlayPlugin {
             .init_resource::<prepare::PendingSplats>()
             .init_resource::<prepare::SplatBatches>()
             .init_resource::<prepare::StampBuffer>()
-            .add_systems(RenderStartup, pass::init_splat_pipeline)
+            .init_resource::<mips::MipBatches>()
+            .add_systems(RenderStartup, (pass::init_splat_pipeline, mips::init_mip_pipeline))
             .add_systems(ExtractSchedule, (prepare::extract_splats, prepare::extract_stamps).chain())
             .add_systems(Render, prepare::prepare_splats.in_set(RenderSystems::PrepareBindGroups))
             // Materials sample the maps that this pass writes.

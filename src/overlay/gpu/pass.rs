@@ -13,6 +13,7 @@ use bevy::render::render_resource::{
 };
 use bevy::render::renderer::RenderContext;
 
+use super::mips::{MipBatches, MipPipeline};
 use super::prepare::{SplatBatches, SurfaceBatch};
 
 /// The compiled pass.
@@ -58,12 +59,14 @@ pub(super) fn init_splat_pipeline(
     commands.insert_resource(SplatPipeline { frame_layout, surface_layout, pipeline });
 }
 
-/// Dispatches this frame's jobs.
+/// Dispatches this frame's jobs, then the halving of what they painted.
 pub(super) fn paint_splats(
     mut context: RenderContext,
     cache: Res<PipelineCache>,
     pipeline: Res<SplatPipeline>,
     batches: Res<SplatBatches>,
+    mip_pipeline: Res<MipPipeline>,
+    mips: Res<MipBatches>,
 ) {
     if batches.jobs.is_empty() {
         return;
@@ -81,4 +84,6 @@ pub(super) fn paint_splats(
         pass.set_bind_group(1, &job.surface, &[]);
         pass.dispatch_workgroups(job.tiles, 1, 1);
     }
+    drop(pass);
+    mips.halve(encoder, &cache, &mip_pipeline);
 }

@@ -16,8 +16,11 @@ use bevy::render::texture::GpuImage;
 use bevy::render::{Extract, MainWorld};
 
 use super::maps::Overlays;
+use super::mips::{MipBatches, MipPipeline, SurfaceLevels};
 use super::pass::SplatPipeline;
-use crate::overlay::{Splat, SplatQueue, StampAtlas, SurfaceFrames, TexelFrame, TileBins, TileHeader, Wrap};
+use crate::overlay::{
+    Lying, Splat, SplatQueue, StampAtlas, SurfaceFrames, TexelFrame, TileBins, TileHeader, Wrap,
+};
 
 /// What the pass needs to know about one surface. `SurfaceBatch` in `shaders/splat.wgsl` has the same fields.
 #[derive(ShaderType, Debug, Clone, Copy)]
@@ -74,9 +77,12 @@ pub(super) struct PendingSplats {
 struct PendingSurface {
     entity: Entity,
     maps: Maps,
-    /// Where the texels lie, and that on the GPU once the first splat in space comes.
+    /// Where the texels lie, and that on the GPU once the first splat in space comes; with it, which of them lie anywhere.
     frames: Option<SurfaceFrames>,
     frame_buffer: Option<Buffer>,
+    lying: Option<Buffer>,
+    /// While the maps stay.
+    levels: Option<SurfaceLevels>,
     splats: Vec<Splat>,
 }
 
@@ -113,6 +119,12 @@ pub(super) fn extract_splats(
     let query = query.get_or_insert_with(|| main_world.query());
     let PendingSplats { surfaces, by_entity } = &mut *pending;
     for (entity, overlays, mut queue, frames) in query.iter_mut(&mut main_world) {
+        // Levels hold on to their textures, also those that a surface has no more.
+        if let Some(&index) = by_entity.get(&entity)
+            && surfaces[index].maps.images != Maps::from(overlays).images
+        {
+            surfaces[index].levels = None;
+        }
         if queue.is_empty() {
             continue;
         }
@@ -123,6 +135,8 @@ pub(super) fn extract_splats(
                 maps,
                 frames: None,
                 frame_buffer: None,
+                lying: None,
+                levels: None,
                 splats: Vec::new(),
             });
             surfaces.len() - 1
@@ -135,7 +149,8 @@ pub(super) fn extract_splats(
         waiting.maps = overlays.into();
         let place = |frames: &SurfaceFrames| Arc::as_ptr(&frames.0);
         if waiting.frames.as_ref().map(place) != frames.map(place) {
-            (waiting.frames, waiting.frame_buffer) = (frames.cloned(), None);
+            (waiting.frames, waiting.frame_buffer, waiting.lying) = (frames.cloned(), None, None);
+            waiting.levels = None;
         }
         queue.drain_into(&mut waiting.splats);
     }
@@ -184,6 +199,8 @@ pub(super) struct SplatBatches {
     bins: TileBins,
     /// For surfaces on which nothing lies in space.
     no_frames: Option<Buffer>,
+    /// For the mip maps of these.
+    no_mask: Option<Buffer>,
     /// The buffers above.
     pub(super) frame: Option<BindGroup>,
     pub(super) jobs: Vec<Job>,
@@ -205,6 +222,7 @@ impl Default for SplatBatches {
             list: RawBufferVec::new(BufferUsages::STORAGE),
             bins: TileBins::default(),
             no_frames: None,
+            no_mask: None,
             frame: None,
             jobs: Vec::new(),
         }
@@ -215,19 +233,23 @@ impl Default for SplatBatches {
 pub(super) fn prepare_splats(
     mut pending: ResMut<PendingSplats>,
     mut batches: ResMut<SplatBatches>,
+    mut mips: ResMut<MipBatches>,
     mut stamps: ResMut<StampBuffer>,
     stats: Res<SplatStats>,
     pipeline: Res<SplatPipeline>,
+    mip_pipeline: Res<MipPipeline>,
     cache: Res<PipelineCache>,
     images: Res<RenderAssets<GpuImage>>,
     buffers: Res<RenderAssets<GpuShaderBuffer>>,
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
 ) {
-    let SplatBatches { batches, splats, tiles, list, bins, no_frames, frame, jobs } = &mut *batches;
+    let SplatBatches { batches, splats, tiles, list, bins, no_frames, no_mask, frame, jobs } = &mut *batches;
     jobs.clear();
+    mips.clear();
     if pending.surfaces.iter().all(|surface| surface.splats.is_empty())
         || cache.get_compute_pipeline(pipeline.pipeline).is_none()
+        || cache.get_compute_pipeline(mip_pipeline.pipeline).is_none()
     {
         return;
     }
@@ -247,24 +269,36 @@ pub(super) fn prepare_splats(
         let frames = waiting.frames.as_ref();
         bins.bin(&waiting.splats, size, wrap, frames, first_splat, tiles.values_mut(), list.values_mut());
         let in_space = waiting.splats.iter().any(|splat| splat.in_space != 0);
-        let frame_buffer = match (&mut waiting.frame_buffer, frames) {
-            (Some(buffer), _) => &*buffer,
-            (none, Some(frames)) if in_space => {
-                &*none.insert(fixed_buffer(&device, "weathering frames", frames.texels()))
-            }
-            _ => &*no_frames.get_or_insert_with(|| fixed_buffer::<TexelFrame>(&device, "no frames", &[])),
-        };
+        if in_space
+            && waiting.frame_buffer.is_none()
+            && let Some(frames) = frames
+        {
+            waiting.frame_buffer = Some(fixed_buffer(&device, "weathering frames", frames.texels()));
+            waiting.lying = Some(fixed_buffer(&device, "weathering mask", Lying::new(frames).words()));
+        }
+        let no_frames =
+            no_frames.get_or_insert_with(|| fixed_buffer::<TexelFrame>(&device, "no frames", &[]));
+        let no_mask = no_mask.get_or_insert_with(|| fixed_buffer::<u32>(&device, "no mask", &[]));
+        let frame_buffer = waiting.frame_buffer.as_ref().unwrap_or(no_frames);
+        let maps = [diffuse, specular, normal];
+        let masked = waiting.lying.is_some();
+        let known = waiting.levels.take().filter(|levels| levels.are_of(maps, masked));
+        let levels = waiting.levels.insert(known.unwrap_or_else(|| {
+            let lying = waiting.lying.as_ref().unwrap_or(no_mask);
+            SurfaceLevels::new(maps, lying, masked, &mip_pipeline, &cache, &device)
+        }));
         splats.values_mut().extend_from_slice(&waiting.splats);
         let touched = tiles.len() as u32 - first_tile;
+        mips.add(levels, size, &tiles.values()[first_tile as usize..]);
         let clamped = UVec2::from_array(wrap.map(|wrap| u32::from(wrap == Wrap::Clamp)));
         jobs.push(Job {
             surface: device.create_bind_group(
                 "weathering surface",
                 &cache.get_bind_group_layout(&pipeline.surface_layout),
                 &BindGroupEntries::sequential((
-                    &diffuse.texture_view,
-                    &specular.texture_view,
-                    &normal.texture_view,
+                    &levels.painted[0],
+                    &levels.painted[1],
+                    &levels.painted[2],
                     rings.buffer.as_entire_buffer_binding(),
                     frame_buffer.as_entire_buffer_binding(),
                 )),
@@ -279,6 +313,7 @@ pub(super) fn prepare_splats(
     splats.write_buffer(&device, &queue);
     tiles.write_buffer(&device, &queue);
     list.write_buffer(&device, &queue);
+    mips.write(&mip_pipeline, &cache, &device, &queue);
     let (Some(batches), Some(splats), Some(tiles), Some(list)) =
         (batches.binding(), splats.binding(), tiles.binding(), list.binding())
     else {
