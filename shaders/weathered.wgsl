@@ -1,6 +1,9 @@
 // A weathered surface: `StandardMaterial` with its overlays laid on, lit by `wet_lighting`.
 //
 // What a surface does not have is not compiled in, see `PorousKey` in `src/material/key.rs`: a dry one is lit by Bevy.
+//
+// Textures of the material lie in the first uvs of the mesh and its normal map in the frame of its tangents. What fell on the
+// surface, colour, relief, water and matter, lies in `map_uv` and in the frame of that. Both may be the same.
 
 #import bevy_pbr::{
     forward_io::{VertexOutput, FragmentOutput},
@@ -24,6 +27,17 @@
 #import bevy_pbr::pbr_functions::visibility_range_dither
 #endif
 
+#ifdef WEATHERED_UVS
+// Where a point lies on the maps of the surface: in the second uvs of the mesh where the first are not unique.
+fn map_uv(in: VertexOutput) -> vec2<f32> {
+#ifdef WEATHERED_UVS_B
+    return in.uv_b;
+#else
+    return in.uv;
+#endif
+}
+#endif
+
 // Tilts a normal by slopes along the directions in which u and v grow.
 //
 // The directions come from screen-space derivatives of position and uv, so the mesh needs no tangents (Mikkelsen
@@ -43,19 +57,20 @@ fn tilt_normal(normal: vec3<f32>, slopes: vec2<f32>, dp_dx: vec3<f32>, dp_dy: ve
 
 // Colour, gloss and relief that fell on the surface, over its own.
 fn apply_paint(pbr: ptr<function, PbrInput>, in: VertexOutput) {
-#ifdef VERTEX_UVS_A
-    let diffuse = textureSample(diffuse_map, map_sampler, in.uv);
+#ifdef WEATHERED_UVS
+    let uv = map_uv(in);
+    let diffuse = textureSample(diffuse_map, map_sampler, uv);
     let base = (*pbr).material.base_color;
     (*pbr).material.base_color = vec4(base.rgb * (1.0 - diffuse.a) + diffuse.rgb, base.a);
-    let specular = textureSample(specular_map, map_sampler, in.uv);
+    let specular = textureSample(specular_map, map_sampler, uv);
     (*pbr).material.reflectance = (*pbr).material.reflectance * (1.0 - specular.a) + specular.r;
     (*pbr).material.perceptual_roughness =
         (*pbr).material.perceptual_roughness * (1.0 - specular.a) + (specular.a - specular.g);
     // Premultiplied around 0.5: no coverage is no slope.
-    let normal = textureSample(normal_map, map_sampler, in.uv);
+    let normal = textureSample(normal_map, map_sampler, uv);
     let slopes = 2.0 * normal.rg - normal.a;
     (*pbr).N = tilt_normal((*pbr).N, slopes, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz),
-        dpdx(in.uv), dpdy(in.uv));
+        dpdx(uv), dpdy(uv));
 #endif
 }
 
@@ -105,8 +120,12 @@ fn weathered_color(pbr_input: PbrInput, in: VertexOutput) -> vec4<f32> {
     var pbr = pbr_input;
     var water: Water;
     var normal = normalize(pbr.world_normal);
+#ifdef WEATHERED_UVS
+    let uv = map_uv(in);
+    var texture_uv = vec2(0.0);
 #ifdef VERTEX_UVS_A
-    let texture_uv = (pbr_bindings::material.uv_transform * vec3(in.uv, 1.0)).xy;
+    texture_uv = (pbr_bindings::material.uv_transform * vec3(in.uv, 1.0)).xy;
+#endif
     var surface = vec4(1.0);
 #ifdef WEATHERED_SURFACE_TEXTURE
     surface = textureSample(surface_texture, surface_sampler, texture_uv);
@@ -115,7 +134,7 @@ fn weathered_color(pbr_input: PbrInput, in: VertexOutput) -> vec4<f32> {
 #ifdef VERTEX_COLORS
     paint = in.color.g;
 #endif
-    water = water_on(in.uv, surface.g, paint);
+    water = water_on(uv, surface.g, paint);
     var wet_color = pbr.material.base_color.rgb;
 #ifdef WEATHERED_WET_COLOR_TEXTURE
     wet_color = textureSample(wet_color_texture, wet_color_sampler, texture_uv).rgb;
@@ -126,15 +145,15 @@ fn weathered_color(pbr_input: PbrInput, in: VertexOutput) -> vec4<f32> {
     apply_model(&pbr, &water, surface.r, wet_color * porous.wet_color);
 #ifdef WEATHERED_MATTER
     apply_matter(&pbr, &water);
-    let heaps = heap_slopes(in.uv);
-    normal = tilt_normal(normal, heaps, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz), dpdx(in.uv), dpdy(in.uv));
+    let heaps = heap_slopes(uv);
+    normal = tilt_normal(normal, heaps, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz), dpdx(uv), dpdy(uv));
     // What covers a relief evens it out.
-    pbr.N = normalize(mix(tilt_normal(pbr.N, heaps, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz), dpdx(in.uv), dpdy(in.uv)),
+    pbr.N = normalize(mix(tilt_normal(pbr.N, heaps, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz), dpdx(uv), dpdy(uv)),
         normal, matter_cover(water.matter.z, matter_look.flake_mm)));
 #endif
 #ifdef WEATHERED_STANDING
-    let waves = ripples(in.uv, in.world_position.xyz, water.levelness);
-    normal = tilt_normal(normal, -waves.xy, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz), dpdx(in.uv), dpdy(in.uv));
+    let waves = ripples(uv, in.world_position.xyz, water.levelness);
+    normal = tilt_normal(normal, -waves.xy, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz), dpdx(uv), dpdy(uv));
     normal = normalize(normal - vec3(waves.z, 0.0, waves.w));
 #endif
 #endif

@@ -11,6 +11,7 @@ use super::{
     WettingTextures,
 };
 use crate::clock::WeatheringClock;
+use crate::collision::UvSet;
 use crate::matter::MatterLook;
 use crate::overlay::{Overlays, SurfaceTraces, TexelArea, Weatherable};
 
@@ -27,6 +28,7 @@ type Surface = (
     Option<&'static StandingWater>,
     Option<&'static WettingTextures>,
     Option<&'static PlayedWetMap>,
+    Option<&'static UvSet>,
 );
 
 /// What changes the constants of a surface.
@@ -38,10 +40,11 @@ type Edited = Or<(
     Changed<Overlays>,
     Changed<TexelArea>,
     Changed<SurfaceTraces>,
+    Changed<UvSet>,
 )>;
 
 fn extension(
-    (maps, areas, traces, porous, standing, textures, played): (
+    (maps, areas, traces, porous, standing, textures, played, uvs): (
         &Overlays,
         &TexelArea,
         &SurfaceTraces,
@@ -49,6 +52,7 @@ fn extension(
         Option<&StandingWater>,
         Option<&WettingTextures>,
         Option<&PlayedWetMap>,
+        Option<&UvSet>,
     ),
     buffer: &ClockBuffer,
     clock: &WeatheringClock,
@@ -64,6 +68,7 @@ fn extension(
         played,
         hz: clock.hz(),
         traces: *traces,
+        uvs: uvs.copied().unwrap_or_default(),
     };
     let played = played.map(|played| played.map.clone());
     PorousExtension::new(look.key(), look.uniform(), maps, look.textures, played, buffer.0.clone(), matter)

@@ -28,7 +28,20 @@ impl UvOverlap {
 
 /// Rasterizes the triangles into a map of `size` x `size` texels that tiles, and counts who owns each: a triangle owns
 /// those whose middle it covers. One that reaches over more than the map counts as lying on itself, everywhere.
+///
+/// Triangles that share an edge share no texel, whatever the rounding; islands thinner than a texel may be missed.
 pub fn measure_overlap(triangles: &MeshTriangles, size: u32) -> UvOverlap {
+    measure_until(triangles, size, f32::INFINITY)
+}
+
+/// [`UvOverlap::needs_unwrap`] of the same, without looking further than it takes: of many triangles that all lie over the
+/// whole map, a few are enough.
+pub fn shares_texels(triangles: &MeshTriangles, size: u32) -> bool {
+    measure_until(triangles, size, UvOverlap::TOLERANCE).needs_unwrap()
+}
+
+/// Measures until so large a part of the whole map is owned twice.
+fn measure_until(triangles: &MeshTriangles, size: u32, enough: f32) -> UvOverlap {
     if triangles.uvs.is_empty() {
         return UvOverlap::default();
     }
@@ -39,9 +52,13 @@ pub fn measure_overlap(triangles: &MeshTriangles, size: u32) -> UvOverlap {
     let tile = ((low + high) / 2.0).floor();
     let texel = 1.0 / size as f32;
     let outside = (low - tile).min_element() < -texel || (high - tile).max_element() > 1.0 + texel;
+    if outside && enough.is_finite() {
+        return UvOverlap { outside, overlapping: 0.0 };
+    }
 
     let side = size as i32;
     let mut owners = vec![0u8; size as usize * size as usize];
+    let (mut covered, mut twice) = (0u32, 0u32);
     for uvs in &triangles.uvs {
         // Far from zero an f32 has no digits left for parts of a texel.
         let texels = Footprint::new(uvs.map(|uv| (uv - tile) * size as f32));
@@ -53,14 +70,18 @@ pub fn measure_overlap(triangles: &MeshTriangles, size: u32) -> UvOverlap {
             for x in low.x.floor() as i32..=high.x.floor() as i32 {
                 if texels.covers(Vec2::new(x as f32 + 0.5, y as f32 + 0.5)) {
                     let index = y.rem_euclid(side) as usize * size as usize + x.rem_euclid(side) as usize;
+                    covered += u32::from(owners[index] == 0);
+                    twice += u32::from(owners[index] == 1);
                     owners[index] = owners[index].saturating_add(1);
                 }
             }
         }
+        // No more than the whole map can be covered, so this is too much however it goes on.
+        if twice as f32 > enough * owners.len() as f32 {
+            break;
+        }
     }
-    let covered = owners.iter().filter(|&&count| count > 0).count().max(1);
-    let twice = owners.iter().filter(|&&count| count > 1).count();
-    UvOverlap { outside, overlapping: twice as f32 / covered as f32 }
+    UvOverlap { outside, overlapping: twice as f32 / covered.max(1) as f32 }
 }
 
 #[cfg(test)]
@@ -153,6 +174,24 @@ mod tests {
     fn tiled_uvs_cost_no_more_than_the_map() {
         let tiled = measure(&[(Vec2::ZERO, Vec2::splat(1.0e6))]);
         assert_eq!(tiled, UvOverlap { outside: true, overlapping: 1.0 });
+    }
+
+    #[test]
+    fn what_is_seen_early_is_what_is_seen_in_the_end() {
+        let half = (Vec2::ZERO, Vec2::new(0.5, 1.0));
+        let sliver = (Vec2::ZERO, Vec2::new(0.004, 1.0));
+        for all in [
+            vec![ALL],
+            vec![ALL, sliver],
+            vec![half, shifted(half, Vec2::X * 0.5)],
+            vec![ALL; 50],
+            vec![half, half],
+            vec![shifted(ALL, Vec2::X * 0.5)],
+        ] {
+            let triangles = rectangles(&all);
+            let whole = measure_overlap(&triangles, SIZE).needs_unwrap();
+            assert_eq!(shares_texels(&triangles, SIZE), whole, "{all:?}");
+        }
     }
 
     #[test]
