@@ -1,6 +1,9 @@
 // A weathered surface: `StandardMaterial` with its overlays laid on, lit by `wet_lighting`.
 //
 // What a surface does not have is not compiled in, see `PorousKey` in `src/material/key.rs`: a dry one is lit by Bevy.
+//
+// Textures of the material lie in the first uvs of the mesh and its normal map in the frame of its tangents. What fell on the
+// surface, colour, relief, water and matter, lies in `map_uv` and in the frame of that. Both may be the same.
 
 #import bevy_pbr::{
     forward_io::{VertexOutput, FragmentOutput},
@@ -25,12 +28,24 @@
 #import bevy_pbr::pbr_functions::visibility_range_dither
 #endif
 
+#ifdef WEATHERED_UVS
+// Where a point lies on the maps of the surface: in the second uvs of the mesh where the first are not unique.
+fn map_uv(in: VertexOutput) -> vec2<f32> {
+#ifdef WEATHERED_UVS_B
+    return in.uv_b;
+#else
+    return in.uv;
+#endif
+}
+#endif
+
 // How uvs lie at a point. ground: the normal without any relief; relief: with the base normal map, which Bevy turns to the
 // viewer on a back face, while it may leave the other.
 fn frame_of(in: VertexOutput, ground: vec3<f32>, relief: vec3<f32>) -> Frame {
     let normal = faced(normalize(ground), relief);
-#ifdef VERTEX_UVS_A
-    return surface_frame(normal, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz), dpdx(in.uv), dpdy(in.uv));
+#ifdef WEATHERED_UVS
+    let uv = map_uv(in);
+    return surface_frame(normal, dpdx(in.world_position.xyz), dpdy(in.world_position.xyz), dpdx(uv), dpdy(uv));
 #else
     return Frame(vec3(0.0), vec3(0.0), normal, 0.0, vec2(0.0));
 #endif
@@ -38,15 +53,16 @@ fn frame_of(in: VertexOutput, ground: vec3<f32>, relief: vec3<f32>) -> Frame {
 
 // Colour, gloss and relief that fell on the surface, over its own.
 fn apply_paint(pbr: ptr<function, PbrInput>, in: VertexOutput, frame: Frame) {
-#ifdef VERTEX_UVS_A
-    let diffuse = textureSample(diffuse_map, map_sampler, in.uv);
+#ifdef WEATHERED_UVS
+    let uv = map_uv(in);
+    let diffuse = textureSample(diffuse_map, map_sampler, uv);
     let base = (*pbr).material.base_color;
     (*pbr).material.base_color = vec4(base.rgb * (1.0 - diffuse.a) + diffuse.rgb, base.a);
-    let specular = textureSample(specular_map, map_sampler, in.uv);
+    let specular = textureSample(specular_map, map_sampler, uv);
     (*pbr).material.reflectance = (*pbr).material.reflectance * (1.0 - specular.a) + specular.r;
     (*pbr).material.perceptual_roughness =
         (*pbr).material.perceptual_roughness * (1.0 - specular.a) + (specular.a - specular.g);
-    let slopes = painted_slopes(textureSample(normal_map, map_sampler, in.uv));
+    let slopes = painted_slopes(textureSample(normal_map, map_sampler, uv));
     (*pbr).N = relieved(frame, (*pbr).N, slopes);
 #endif
 }
@@ -97,8 +113,12 @@ fn weathered_color(pbr_input: PbrInput, in: VertexOutput, frame: Frame) -> vec4<
     var pbr = pbr_input;
     var water: Water;
     var normal = frame.normal;
+#ifdef WEATHERED_UVS
+    let uv = map_uv(in);
+    var texture_uv = vec2(0.0);
 #ifdef VERTEX_UVS_A
-    let texture_uv = (pbr_bindings::material.uv_transform * vec3(in.uv, 1.0)).xy;
+    texture_uv = (pbr_bindings::material.uv_transform * vec3(in.uv, 1.0)).xy;
+#endif
     var surface = vec4(1.0);
 #ifdef WEATHERED_SURFACE_TEXTURE
     surface = textureSample(surface_texture, surface_sampler, texture_uv);
@@ -107,7 +127,7 @@ fn weathered_color(pbr_input: PbrInput, in: VertexOutput, frame: Frame) -> vec4<
 #ifdef VERTEX_COLORS
     paint = in.color.g;
 #endif
-    water = water_on(in.uv, surface.g, paint);
+    water = water_on(uv, surface.g, paint);
     var wet_color = pbr.material.base_color.rgb;
 #ifdef WEATHERED_WET_COLOR_TEXTURE
     wet_color = textureSample(wet_color_texture, wet_color_sampler, texture_uv).rgb;
@@ -118,14 +138,14 @@ fn weathered_color(pbr_input: PbrInput, in: VertexOutput, frame: Frame) -> vec4<
     apply_model(&pbr, &water, surface.r, wet_color * porous.wet_color);
 #ifdef WEATHERED_MATTER
     apply_matter(&pbr, &water);
-    let heaps = slopes_in_frame(frame, heap_falls(in.uv));
+    let heaps = slopes_in_frame(frame, heap_falls(uv));
     // What covers a relief evens it out; its own lies on what is left.
     let evened = normalize(mix(pbr.N, normal, matter_cover(water.matter.z, matter_look.flake_mm)));
     pbr.N = relieved(frame, evened, heaps);
     normal = relieved(frame, normal, heaps);
 #endif
 #ifdef WEATHERED_STANDING
-    let waves = ripples(in.uv, in.world_position.xyz, water.levelness);
+    let waves = ripples(uv, in.world_position.xyz, water.levelness);
     normal = relieved(frame, normal, -waves.xy);
     // Rain that is not simulated knows no uvs: its waves are those of level water, laid on this one.
     normal = reoriented(normal.xzy, relief_normal(-waves.zw)).xzy;

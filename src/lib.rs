@@ -17,6 +17,7 @@ pub mod scenario;
 pub mod scenes;
 pub mod schedule;
 pub mod stamps;
+pub mod unwrap;
 pub mod weather;
 pub mod wetmap;
 pub mod wetting;
@@ -32,7 +33,7 @@ pub mod prelude {
     pub use crate::effect::WeatherEffect;
     pub use crate::emitter::{Emitter, EmitterShape, Flow};
     pub use crate::material::{PorousMaterial, StandingWater, WettingModel};
-    pub use crate::overlay::{Weatherable, Wrap};
+    pub use crate::overlay::{OverlayUv, Weatherable, Wrap};
     pub use crate::particle::Forces;
     pub use crate::schedule::{WeatheringSystems, WeatheringTick};
     pub use crate::weather::Weather;
@@ -49,6 +50,7 @@ pub mod prelude {
 /// | [`EffectPlugin`](effect::EffectPlugin) | loads what falls | no |
 /// | [`EmitterPlugin`](emitter::EmitterPlugin) | spawns particles | no |
 /// | [`ParticlePlugin`](particle::ParticlePlugin) | moves and retires them | no |
+/// | [`UnwrapPlugin`](unwrap::UnwrapPlugin) | gives meshes whose uvs overlap unique ones | no |
 /// | [`CollisionPlugin`](collision::CollisionPlugin) | finds what they hit | no |
 /// | [`DepositPlugin`](overlay::DepositPlugin) | turns impacts into splats | no |
 /// | [`MatterPlugin`](matter::MatterPlugin) | gives surfaces room for dust, mud and snow | no |
@@ -71,6 +73,7 @@ impl PluginGroup for WeatheringPlugins {
             .add(effect::EffectPlugin)
             .add(emitter::EmitterPlugin)
             .add(particle::ParticlePlugin)
+            .add(unwrap::UnwrapPlugin)
             .add(collision::CollisionPlugin)
             .add(overlay::DepositPlugin)
             .add(matter::MatterPlugin)

@@ -31,6 +31,8 @@ mod gpu {
     mod twins;
     /// Shaders that change.
     mod understudy;
+    /// Meshes that show an unwrapped copy.
+    mod unwrapped;
     /// Water as it is drawn.
     mod water;
 }
@@ -50,6 +52,8 @@ mod schedule;
 mod seams;
 /// The smaller tools of the program.
 mod tools;
+/// Meshes whose texture coordinates lie on each other.
+mod unwrap;
 /// Wet maps, made as their users make them.
 mod wetmap;
 /// Water in and on surfaces.

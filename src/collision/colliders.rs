@@ -6,7 +6,7 @@ use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 
-use super::{Deformer, MeshBvh, MeshTriangles, TriangleError, TriangleReport};
+use super::{AwaitsUvs, Deformer, MeshBvh, MeshTriangles, TriangleError, TriangleReport, UvSet};
 use crate::overlay::Weatherable;
 
 /// The BVH of this entity's mesh. Added to every [`Weatherable`] entity once it is built.
@@ -26,7 +26,7 @@ type Built = Result<Arc<MeshBvh>, TriangleError>;
 /// The BVHs of all meshes in use.
 #[derive(Resource, Default)]
 pub struct MeshColliders {
-    meshes: HashMap<AssetId<Mesh>, MeshCollider>,
+    meshes: HashMap<(AssetId<Mesh>, UvSet), MeshCollider>,
     /// Something was built in this frame.
     news: bool,
 }
@@ -46,15 +46,27 @@ impl MeshColliders {
         self.meshes.values().filter(|mesh| mesh.task.is_some() || mesh.stale).count()
     }
 
-    /// The finished BVH of a mesh.
-    pub fn get(&self, mesh: AssetId<Mesh>) -> Option<&Arc<MeshBvh>> {
-        self.meshes.get(&mesh)?.built.as_ref()?.as_ref().ok()
+    /// The finished BVH of a mesh with the uvs of a set.
+    pub fn get(&self, mesh: AssetId<Mesh>, uvs: UvSet) -> Option<&Arc<MeshBvh>> {
+        self.meshes.get(&(mesh, uvs))?.built.as_ref()?.as_ref().ok()
     }
 }
 
-/// Surfaces that want a collider and have neither got one nor been refused, or show another mesh now.
-type Wanting =
-    (With<Weatherable>, Or<((Without<SurfaceCollider>, Without<NotWeatherable>), Changed<Mesh3d>)>);
+/// Surfaces that want a collider and have neither got one nor been refused, or show another mesh or have other uvs now.
+type Wanting = (
+    With<Weatherable>,
+    Without<AwaitsUvs>,
+    Or<((Without<SurfaceCollider>, Without<NotWeatherable>), Changed<Mesh3d>, Changed<UvSet>)>,
+);
+
+type Surface = (
+    Entity,
+    &'static Mesh3d,
+    Option<&'static UvSet>,
+    Option<&'static SurfaceCollider>,
+    Option<&'static NotWeatherable>,
+    Option<&'static Name>,
+);
 
 /// Notes which meshes changed or are gone.
 pub(super) fn watch_meshes(
@@ -64,12 +76,16 @@ pub(super) fn watch_meshes(
     for event in events.read() {
         match event {
             AssetEvent::Modified { id } => {
-                if let Some(mesh) = colliders.meshes.get_mut(id) {
-                    mesh.stale = true;
+                for uvs in [UvSet::First, UvSet::Second] {
+                    if let Some(mesh) = colliders.meshes.get_mut(&(*id, uvs)) {
+                        mesh.stale = true;
+                    }
                 }
             }
             AssetEvent::Removed { id } => {
-                colliders.news |= colliders.meshes.remove(id).is_some();
+                for uvs in [UvSet::First, UvSet::Second] {
+                    colliders.news |= colliders.meshes.remove(&(*id, uvs)).is_some();
+                }
             }
             _ => {}
         }
@@ -81,13 +97,14 @@ pub(super) fn build_colliders(
     meshes: Res<Assets<Mesh>>,
     assets: Option<Res<AssetServer>>,
     mut colliders: ResMut<MeshColliders>,
-    wanting: Query<&Mesh3d, Wanting>,
+    wanting: Query<(&Mesh3d, Option<&UvSet>), Wanting>,
 ) {
     let MeshColliders { meshes: known, news } = &mut *colliders;
-    for handle in &wanting {
-        known.entry(handle.id()).or_insert_with(|| MeshCollider { stale: true, ..default() });
+    for (handle, uvs) in &wanting {
+        let key = (handle.id(), uvs.copied().unwrap_or_default());
+        known.entry(key).or_insert_with(|| MeshCollider { stale: true, ..default() });
     }
-    for (id, collider) in known.iter_mut() {
+    for ((id, uvs), collider) in known.iter_mut() {
         if let Some(task) = &mut collider.task
             && let Some(built) = check_ready(task)
         {
@@ -100,7 +117,7 @@ pub(super) fn build_colliders(
         let load = || assets.as_ref().and_then(|assets| assets.get_load_state(*id));
         if let Some(mesh) = meshes.get(*id) {
             collider.stale = false;
-            match MeshTriangles::from_mesh(mesh) {
+            match MeshTriangles::with_uvs(mesh, *uvs) {
                 Ok(triangles) => {
                     let deformer = Deformer::from_mesh(mesh, &triangles);
                     let build =
@@ -120,18 +137,16 @@ pub(super) fn attach_colliders(
     mut commands: Commands,
     mut colliders: ResMut<MeshColliders>,
     wanting: Query<(), Wanting>,
-    surfaces: Query<
-        (Entity, &Mesh3d, Option<&SurfaceCollider>, Option<&NotWeatherable>, Option<&Name>),
-        With<Weatherable>,
-    >,
+    surfaces: Query<Surface, (With<Weatherable>, Without<AwaitsUvs>)>,
 ) {
     if !std::mem::take(&mut colliders.news) && wanting.is_empty() {
         return;
     }
-    for (entity, mesh, collider, refused, name) in &surfaces {
+    for (entity, mesh, uvs, collider, refused, name) in &surfaces {
         let label = || name.map_or_else(|| entity.to_string(), ToString::to_string);
         let mut entity = commands.entity(entity);
-        match colliders.meshes.get(&mesh.id()).and_then(|mesh| mesh.built.as_ref()) {
+        let key = (mesh.id(), uvs.copied().unwrap_or_default());
+        match colliders.meshes.get(&key).and_then(|mesh| mesh.built.as_ref()) {
             Some(Ok(bvh)) if collider.is_none_or(|collider| !Arc::ptr_eq(&collider.0, bvh)) => {
                 let report = bvh.triangles().report;
                 warn_of_skipped(report, label);
@@ -144,7 +159,7 @@ pub(super) fn attach_colliders(
                 entity.remove::<(SurfaceCollider, ColliderReport)>().insert(NotWeatherable(*error));
             }
             Some(_) => {}
-            // Another mesh, whose BVH is not there yet: the old one is not its shape.
+            // Another mesh or other uvs, whose BVH is not there yet: the old one is not its shape.
             None if collider.is_some() || refused.is_some() => {
                 entity.remove::<(SurfaceCollider, ColliderReport, NotWeatherable)>();
             }

@@ -1,7 +1,7 @@
 //! Particles against meshes: swept segments, closest hits, exact uv.
 //!
-//! Each mesh asset gets one BVH ([`MeshBvh`]), built off the main thread and shared by all entities that show the
-//! mesh. The [`CollisionScene`] holds those entities with their transforms under a BVH of their own. A particle
+//! Each mesh asset gets one BVH ([`MeshBvh`]) for each set of uvs that is asked for ([`UvSet`]), built off the main thread and
+//! shared by all entities that show the mesh. The [`CollisionScene`] holds those entities with their transforms under a BVH of their own. A particle
 //! casts the segment it moved in this tick: through the upper BVH in world space, then in the space of each mesh
 //! on the way, where the distance is a fraction of the same segment, so that any invertible transform will do.
 //! The closest hit, seen from either side, becomes an [`Impact`] with the uv of the point.
@@ -20,6 +20,7 @@ mod deform;
 mod scene;
 mod trace;
 mod triangles;
+mod uvs;
 
 use bevy::prelude::*;
 
@@ -34,6 +35,7 @@ pub use deform::{Deformer, DeformingCollider, PosedMesh, Shape};
 pub use scene::{CollisionScene, SceneHit};
 pub use trace::{ReportImpacts, SurfaceImpact, trace_particles};
 pub use triangles::{MeshTriangles, TriangleError, TriangleReport};
+pub use uvs::{AwaitsUvs, UvSet};
 
 /// A particle that hit a surface in this tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,7 +50,7 @@ pub struct Impact {
     pub point: Vec3,
     /// Unit normal of the triangle on the side that was hit; world space.
     pub normal: Vec3,
-    /// Texture coordinates of the point, as the mesh has them (any tile).
+    /// Texture coordinates of the point, as the mesh has them in the surface's [`UvSet`] (any tile).
     pub uv: Vec2,
     /// Change of u and v for one metre on the surface along their own directions. 0 where uv does not vary.
     pub uv_per_metre: Vec2,
@@ -84,6 +86,7 @@ impl Plugin for CollisionPlugin {
             .init_resource::<Impacts>()
             .add_message::<SurfaceImpact>()
             .register_type::<ReportImpacts>()
+            .register_type::<UvSet>()
             .add_observer(colliders::release_surface)
             .add_systems(
                 PreUpdate,

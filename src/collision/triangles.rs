@@ -3,6 +3,8 @@
 use bevy::mesh::{Indices, MeshAccessError, PrimitiveTopology, VertexAttributeValues};
 use bevy::prelude::*;
 
+use super::UvSet;
+
 /// The triangles of a mesh that can be hit: finite, of an area above zero, with texture coordinates.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct MeshTriangles {
@@ -45,6 +47,9 @@ pub enum TriangleError {
     /// No texture coordinates, or not as two floats.
     #[error("it has no `UV_0`; unwrap it, or leave `Weatherable` off")]
     NoUvs,
+    /// No second texture coordinates, or not as two floats.
+    #[error("it has no `UV_1`, over which its maps are to lie")]
+    NoSecondUvs,
     /// Points or lines.
     #[error("it is made of {0:?}, not of triangles")]
     Topology(PrimitiveTopology),
@@ -62,12 +67,20 @@ impl TriangleReport {
 }
 
 impl MeshTriangles {
-    /// Reads the triangles of a list or strip, indexed (`u16`, `u32`) or not. Bad triangles are left out and
-    /// counted.
+    /// Reads the triangles of a list or strip, indexed (`u16`, `u32`) or not, with its first uvs. Bad triangles are left out
+    /// and counted.
     ///
     /// # Errors
     /// [`TriangleError`] when nothing of the mesh can be hit.
     pub fn from_mesh(mesh: &Mesh) -> Result<Self, TriangleError> {
+        Self::with_uvs(mesh, UvSet::First)
+    }
+
+    /// The same with the uvs of a set.
+    ///
+    /// # Errors
+    /// [`TriangleError`] when nothing of the mesh can be hit, or it has no such set.
+    pub fn with_uvs(mesh: &Mesh, set: UvSet) -> Result<Self, TriangleError> {
         let topology = mesh.primitive_topology();
         if !matches!(topology, PrimitiveTopology::TriangleList | PrimitiveTopology::TriangleStrip) {
             return Err(TriangleError::Topology(topology));
@@ -77,8 +90,9 @@ impl MeshTriangles {
             Some(VertexAttributeValues::Float32x3(positions)) => positions.as_slice(),
             _ => return Err(TriangleError::NoPositions),
         };
-        let uvs = match mesh.try_attribute_option(Mesh::ATTRIBUTE_UV_0).map_err(on_cpu)? {
+        let uvs = match mesh.try_attribute_option(set.attribute()).map_err(on_cpu)? {
             Some(VertexAttributeValues::Float32x2(uvs)) if uvs.len() == positions.len() => uvs.as_slice(),
+            _ if set == UvSet::Second => return Err(TriangleError::NoSecondUvs),
             _ => return Err(TriangleError::NoUvs),
         };
         let indices = mesh.try_indices_option().map_err(on_cpu)?;
@@ -188,6 +202,22 @@ pub(crate) mod tests {
         let expected = TriangleReport { total: 5, degenerate: 2, non_finite: 1, out_of_range: 1 };
         assert_eq!(triangles.report, expected);
         assert_eq!(triangles.source, [0]);
+    }
+
+    #[test]
+    fn each_set_of_uvs_is_read_where_it_is() {
+        let second: Vec<[f32; 2]> = QUAD.iter().map(|p| [0.5 * p[1], 0.5 * p[0]]).collect();
+        let both = mesh(PrimitiveTopology::TriangleStrip, &QUAD, None)
+            .with_inserted_attribute(Mesh::ATTRIBUTE_UV_1, second);
+        let [first, second] =
+            [UvSet::First, UvSet::Second].map(|set| MeshTriangles::with_uvs(&both, set).unwrap());
+        assert_eq!(first, MeshTriangles::from_mesh(&both).unwrap());
+        assert_eq!(first.positions, second.positions);
+        let turned = |uvs: &[Vec2; 3]| uvs.map(|uv| 0.5 * Vec2::new(uv.y, uv.x));
+        assert_eq!(second.uvs, first.uvs.iter().map(turned).collect::<Vec<_>>());
+        let bare = both.with_removed_attribute(Mesh::ATTRIBUTE_UV_1);
+        let missing = MeshTriangles::with_uvs(&bare, UvSet::Second);
+        assert_eq!(missing, Err(TriangleError::NoSecondUvs));
     }
 
     #[test]

@@ -11,6 +11,7 @@ use super::{
     WettingTextures,
 };
 use crate::clock::WeatheringClock;
+use crate::collision::UvSet;
 use crate::matter::MatterLook;
 use crate::overlay::{Overlays, SurfaceTraces, TexelArea, Weatherable};
 
@@ -26,6 +27,7 @@ type Surface = (
     Option<&'static StandingWater>,
     Option<&'static WettingTextures>,
     Option<&'static PlayedWetMap>,
+    Option<&'static UvSet>,
 );
 
 /// What changes the constants of a surface.
@@ -36,19 +38,21 @@ type Edited = Or<(
     Changed<PlayedWetMap>,
     Changed<Overlays>,
     Changed<SurfaceTraces>,
+    Changed<UvSet>,
 )>;
 
 /// Before its texels are measured nothing can hit a surface, so there is nothing to show on it.
 type Hittable = (With<Weatherable>, With<TexelArea>);
 
 fn extension(
-    (maps, traces, porous, standing, textures, played): (
+    (maps, traces, porous, standing, textures, played, uvs): (
         &Overlays,
         &SurfaceTraces,
         Option<&PorousMaterial>,
         Option<&StandingWater>,
         Option<&WettingTextures>,
         Option<&PlayedWetMap>,
+        Option<&UvSet>,
     ),
     buffer: &ClockBuffer,
     clock: &WeatheringClock,
@@ -63,6 +67,7 @@ fn extension(
         played,
         hz: clock.hz(),
         traces: *traces,
+        uvs: uvs.copied().unwrap_or_default(),
     };
     let played = played.map(|played| played.map.clone());
     PorousExtension::new(look.key(), look.uniform(), maps, look.textures, played, buffer.0.clone(), matter)

@@ -172,11 +172,18 @@ impl MaterialExtension for PorousExtension {
     fn specialize(
         _: &MaterialExtensionPipeline,
         descriptor: &mut RenderPipelineDescriptor,
-        _: &MeshVertexBufferLayoutRef,
+        layout: &MeshVertexBufferLayoutRef,
         key: MaterialExtensionKey<Self>,
     ) -> Result<(), SpecializedMeshPipelineError> {
-        if let Some(fragment) = &mut descriptor.fragment {
-            fragment.shader_defs.extend(key.bind_group_data.shader_defs());
+        let Some(fragment) = &mut descriptor.fragment else { return Ok(()) };
+        fragment.shader_defs.extend(key.bind_group_data.shader_defs());
+        // While meshes are exchanged, one may not have the uvs that are asked for.
+        let second = key.bind_group_data.second_uvs && layout.0.contains(Mesh::ATTRIBUTE_UV_1);
+        if second {
+            fragment.shader_defs.push("WEATHERED_UVS_B".into());
+        }
+        if second || layout.0.contains(Mesh::ATTRIBUTE_UV_0) {
+            fragment.shader_defs.push("WEATHERED_UVS".into());
         }
         Ok(())
     }

@@ -22,6 +22,8 @@ pub struct PorousKey {
     pub unlike_standard: bool,
     /// Drying leaves something behind.
     pub marks: bool,
+    /// Its maps lie over the second uvs of its mesh ([`UvSet::Second`](crate::collision::UvSet)).
+    pub second_uvs: bool,
     /// A [`PlayedWetMap`](super::PlayedWetMap) is there.
     pub played_map: bool,
     /// [`WettingTextures::surface`](super::WettingTextures::surface) is there.

@@ -7,6 +7,7 @@ use super::{
     BaseBrdf, Coated, Flood, PlayedWetMap, Playing, PorositySource, PorousKey, PorousMaterial, PorousUniform,
     StandingWater, TextureMeaning, WettingModel, WettingTextures,
 };
+use crate::collision::UvSet;
 use crate::overlay::{Overlays, SurfaceTraces, Wrap};
 
 impl PorousUniform {
@@ -44,6 +45,7 @@ pub(super) struct SurfaceLook<'a> {
     pub(super) hz: u32,
     pub(super) maps: &'a Overlays,
     pub(super) traces: SurfaceTraces,
+    pub(super) uvs: UvSet,
 }
 
 impl SurfaceLook<'_> {
@@ -57,6 +59,7 @@ impl SurfaceLook<'_> {
             standing: self.standing.is_some_and(|water| water.flood != Flood::None),
             unlike_standard: solid || self.porous.brdf == BaseBrdf::BlinnPhong,
             marks: self.traces.water && self.porous.leaves_marks(),
+            second_uvs: self.uvs == UvSet::Second,
             played_map: self.played.is_some(),
             surface_texture: self.textures.surface.is_some(),
             wet_color_texture: self.textures.wet_color.is_some(),

@@ -282,7 +282,7 @@ mod tests {
             velocity: Vec3::NEG_Y,
             effect: EffectIndex(0),
             class: 0,
-            volume_nl: 4189,
+            volume_nl: 4190,
         }
     }
 
@@ -314,12 +314,12 @@ mod tests {
         schedule.run(&mut world);
 
         let totals = |surface| *world.get::<SurfaceTotals>(surface).unwrap();
-        assert_eq!(totals(one), SurfaceTotals { impacts: 2, water_nl: 8378 });
-        assert_eq!(totals(other), SurfaceTotals { impacts: 1, water_nl: 4189 });
+        assert_eq!(totals(one), SurfaceTotals { impacts: 2, water_nl: 8380 });
+        assert_eq!(totals(other), SurfaceTotals { impacts: 1, water_nl: 4190 });
         let splat = world.get::<SplatQueue>(other).unwrap().splats()[0];
         assert_eq!(splat.center, [256 * 256, 128 * 256]);
         assert_eq!(splat.radius, [32 * 256, 16 * 256]);
-        assert_eq!((splat.water_nl, splat.tick), (4189, 1));
+        assert_eq!((splat.water_nl, splat.tick), (4190, 1));
     }
 
     #[test]

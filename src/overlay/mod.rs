@@ -1,7 +1,7 @@
 //! The maps of a surface, and painting impacts into them.
 //!
-//! Every [`Weatherable`] mesh gets overlay maps over its uv square: three colour maps that lie over its material's
-//! own: diffuse, specular, normal. An impact becomes a [`Splat`] ([`deposit`]), and splats are painted in the order of their
+//! Every [`Weatherable`] mesh gets overlay maps over its uv square, or over that of a second set of uvs ([`OverlayUv`]):
+//! three colour maps that lie over its material's own: diffuse, specular, normal. An impact becomes a [`Splat`] ([`deposit`]), and splats are painted in the order of their
 //! impacts. Their water goes another way, to [`wetting`](crate::wetting).
 //!
 //! Two painters do the same arithmetic, in integers, so that they agree to the bit: a compute pass
@@ -44,8 +44,8 @@ pub use tiles::{TILE_SIZE, TileBins, TileHeader};
 
 /// Makes a mesh entity weatherable: it can be hit, and shows what hit it.
 ///
-/// Needs a mesh with texture coordinates. Where a `StandardMaterial` is on the entity, it is exchanged for its
-/// weathered form with the same settings.
+/// Needs a mesh with texture coordinates, or one that can be unwrapped ([`OverlayUv`]). Where a `StandardMaterial` is on the
+/// entity, it is exchanged for its weathered form with the same settings.
 #[derive(Component, Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq)]
 #[reflect(Component)]
 #[serde(deny_unknown_fields, default)]
@@ -58,6 +58,29 @@ pub struct Weatherable {
     pub wrap_v: Wrap,
     /// Where stamps lie.
     pub stamps: StampSpace,
+    /// Which texture coordinates the maps lie over. For setting up: what has fallen already keeps its place on the map, not
+    /// on the mesh.
+    pub uv: OverlayUv,
+}
+
+/// Which texture coordinates the maps of a surface lie over. Textures of its material keep the ones they have.
+///
+/// A mesh that gets unique ones is shown as a copy that has them as `UV_1`
+/// ([`unwrap`](crate::unwrap)); stamps on the map of such a surface ([`StampSpace::Map`]) end best at its edges
+/// ([`Wrap::Clamp`]), since what lies at the opposite one is another part of the mesh.
+#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum OverlayUv {
+    /// Unique ones, if those of the mesh are not: if they tile, lie on each other, or are not there. Then a `UV_1` of the mesh
+    /// that is unique is taken as it is; one that is not is left alone, as something may be drawn by it, and so are uvs that
+    /// cannot be unwrapped, with a warning. Uvs inside 0..1 that do not lie on each other stay, and so do those under
+    /// stamps on the map ([`StampSpace::Map`]): who asks for these wants them in every tile.
+    #[default]
+    Auto,
+    /// `UV_0` of the mesh, whatever it is like: what falls on one place of a tiled mesh shows in all its tiles.
+    Mesh,
+    /// Like `Auto`, but also under stamps on the map and in place of a `UV_1` that is not unique, and an error where it cannot
+    /// be.
+    Unique,
 }
 
 /// Where the stamps of a surface lie.
@@ -91,6 +114,14 @@ impl Weatherable {
         self.map_size.clamp(TILE_SIZE, Self::MAX_MAP_SIZE).next_multiple_of(TILE_SIZE)
     }
 
+    /// What `uv` comes to with these `stamps`: [`OverlayUv::Auto`] leaves stamps on the map the uvs of the mesh.
+    pub fn wanted_uv(&self) -> OverlayUv {
+        match (self.uv, self.stamps) {
+            (OverlayUv::Auto, StampSpace::Map) => OverlayUv::Mesh,
+            (wanted, _) => wanted,
+        }
+    }
+
     /// Edge behaviour along u and v.
     pub fn wrap(&self) -> [Wrap; 2] {
         [self.wrap_u, self.wrap_v]
@@ -99,6 +130,12 @@ impl Weatherable {
 
 impl Default for Weatherable {
     fn default() -> Self {
-        Self { map_size: 512, wrap_u: Wrap::Repeat, wrap_v: Wrap::Repeat, stamps: StampSpace::default() }
+        Self {
+            map_size: 512,
+            wrap_u: Wrap::Repeat,
+            wrap_v: Wrap::Repeat,
+            stamps: StampSpace::default(),
+            uv: OverlayUv::default(),
+        }
     }
 }

@@ -18,10 +18,11 @@ use crate::overlay::Weatherable;
 use crate::scenes::environment::{
     EnvironmentMaps, EnvironmentSettings, environment_maps_from_equirect, load_equirect,
 };
-use crate::scenes::gltf_mesh::read_first_primitive;
+use crate::scenes::gltf_mesh::read_first_primitive_mesh;
 use crate::scenes::meshes::{self, MeshError};
 use crate::scenes::mips::{MipContent, tiling_sampler, with_mips};
 use crate::scenes::stone::stone_maps;
+use crate::unwrap::{MapTrianglesError, map_triangles};
 
 /// Name, triangles, where it stands, and its maps.
 pub type SurfaceMesh = (String, MeshTriangles, Affine3A, Weatherable);
@@ -121,25 +122,33 @@ impl LoadedScenario {
         Ok(Content { effects, meshes, materials, wet_maps, environment })
     }
 
-    /// The shape of every surface, for tools that need no app: name, triangles, where it stands, and its maps.
+    /// The shape of every surface, for tools that need no app: name, triangles with the uvs that its maps lie over, where it
+    /// stands, and its maps.
     ///
     /// # Errors
     /// [`ScenarioError::Content`] for meshes that cannot be used.
     pub fn surface_meshes(&self) -> Result<Vec<SurfaceMesh>, ScenarioError> {
         let one = |(index, surface): (usize, &SurfaceSpec)| {
             let field = format!("surfaces[{index}].mesh");
-            let triangles = match (&surface.mesh, generate(&surface.mesh)) {
+            let (value, mesh) = match (&surface.mesh, generate(&surface.mesh)) {
                 (MeshSpec::File(file), _) => {
                     let path = self.resolve(&field, file)?;
-                    read_first_primitive(&path).map_err(|e| self.content_error(&field, file, e))?
+                    let mesh = read_first_primitive_mesh(&path);
+                    (file, mesh.map_err(|e| self.content_error(&field, file, e))?)
                 }
                 (_, Some(mesh)) => {
                     let mesh = mesh.map_err(|e| self.content_error(&field, &surface.name, e))?;
-                    MeshTriangles::from_mesh(&mesh)
-                        .map_err(|e| self.content_error(&field, &surface.name, e))?
+                    (&surface.name, mesh)
                 }
                 (_, None) => return Err(self.content_error(&field, &surface.name, "has no shape")),
             };
+            let triangles = map_triangles(&mesh, &surface.maps).map_err(|error| match error {
+                MapTrianglesError::Unwrap(error) => {
+                    let field = format!("surfaces[{index}].maps.uv");
+                    self.content_error(&field, "Unique", format!("{value}: {error}"))
+                }
+                error => self.content_error(&field, value, error),
+            })?;
             Ok((surface.name.clone(), triangles, surface.transform().compute_affine(), surface.maps))
         };
         self.scenario.surfaces.iter().enumerate().map(one).collect()

@@ -15,9 +15,10 @@ use crate::collision::{BuildColliders, MeshColliders, NotWeatherable, SurfaceCol
 use crate::effect::{EffectTable, WeatherEffect};
 use crate::emitter::{EmissionSeed, Emitter};
 use crate::material::{PlayedWetMap, Playing};
-use crate::overlay::{FramesWork, PrepareStamps, TexelArea};
+use crate::overlay::{FramesWork, OverlayUv, PrepareStamps, TexelArea, Weatherable};
 use crate::particle::{Forces, ParticleConfig};
 use crate::schedule::{WeatheringSystems, WeatheringTick};
+use crate::unwrap::NotUnwrapped;
 use crate::wetting::{self, ExposureProgress, MeasureSurfaces};
 
 /// Spawns a scenario and runs it once everything is loaded. Virtual time stands still until then.
@@ -48,7 +49,7 @@ struct CurrentScenario(LoadedScenario);
 /// How far the scenario is.
 #[derive(Resource, Debug, Default)]
 pub enum ScenarioStatus {
-    /// Meshes are being loaded and their BVHs built.
+    /// Meshes are being loaded, unwrapped where they need it, and their BVHs built.
     #[default]
     Loading,
     /// Time runs.
@@ -229,12 +230,18 @@ fn is_loading(status: Res<ScenarioStatus>) -> bool {
     matches!(*status, ScenarioStatus::Loading)
 }
 
-/// Lets time run when every surface can be hit, or says which cannot.
+/// Lets time run when every surface can be hit, with the uvs that it asks for, or says which cannot.
 fn watch_loading(
     current: Res<CurrentScenario>,
     assets: Res<AssetServer>,
     colliders: Res<MeshColliders>,
-    surfaces: Query<(&ScenarioSurface, &Mesh3d, Option<&NotWeatherable>)>,
+    surfaces: Query<(
+        &ScenarioSurface,
+        &Weatherable,
+        &Mesh3d,
+        Option<&NotWeatherable>,
+        Option<&NotUnwrapped>,
+    )>,
     unfinished: Query<
         (),
         (
@@ -247,17 +254,20 @@ fn watch_loading(
     mut status: ResMut<ScenarioStatus>,
     mut time: ResMut<Time<Virtual>>,
 ) {
-    for (surface, mesh, refused) in &surfaces {
-        let reason = match (refused, assets.get_load_state(&mesh.0)) {
-            (Some(NotWeatherable(error)), _) => error.to_string(),
-            (None, Some(LoadState::Failed(error))) => error.to_string(),
-            _ => continue,
-        };
-        let field = format!("surfaces[{}].mesh", surface.index);
-        let value = match &current.0.scenario.surfaces[surface.index as usize].mesh {
+    for (surface, maps, mesh, refused, not_unwrapped) in &surfaces {
+        let shape = match &current.0.scenario.surfaces[surface.index as usize].mesh {
             MeshSpec::File(path) => path.as_str(),
             _ => surface.name.as_str(),
         };
+        let (field, value, reason) = match (refused, assets.get_load_state(&mesh.0), not_unwrapped) {
+            (Some(NotWeatherable(error)), ..) => ("mesh", shape, error.to_string()),
+            (None, Some(LoadState::Failed(error)), _) => ("mesh", shape, error.to_string()),
+            (None, _, Some(NotUnwrapped(error))) if maps.uv == OverlayUv::Unique => {
+                ("maps.uv", "Unique", format!("{shape}: {error}"))
+            }
+            _ => continue,
+        };
+        let field = format!("surfaces[{}].{field}", surface.index);
         *status = ScenarioStatus::Failed(current.0.content_error(&field, value, reason));
         return;
     }

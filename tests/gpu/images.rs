@@ -5,7 +5,7 @@ use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::material::{BaseBrdf, DryMaterial, Pores, PorousMaterial, TextureMeaning, WettingModel};
-use bevy_weathering::overlay::{Overlays, Weatherable, Wrap};
+use bevy_weathering::overlay::{OverlayUv, Overlays, Weatherable, Wrap};
 use image::RgbImage;
 
 use super::app::{add_target, app, camera, cover, picture, still, update, update_until};
@@ -45,7 +45,14 @@ fn draw(surface: Option<PorousMaterial>, metallic: f32, water_mm: f32) -> Option
         let place = Transform::from_xyz(0.0, height, 0.0);
         let mut entity = app.world_mut().spawn((Mesh3d(mesh), MeshMaterial3d(material.clone()), place));
         if let Some(porous) = surface {
-            let maps = Weatherable { map_size: 64, wrap_u: Wrap::Repeat, wrap_v: Wrap::Clamp, ..default() };
+            // Bevy's ball has a seam with overlapping uvs; both pictures are to show the same vertices.
+            let maps = Weatherable {
+                map_size: 64,
+                wrap_u: Wrap::Repeat,
+                wrap_v: Wrap::Clamp,
+                uv: OverlayUv::Mesh,
+                ..default()
+            };
             surfaces.push(entity.insert((maps, porous)).id());
         }
     }

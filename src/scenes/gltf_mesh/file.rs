@@ -25,9 +25,14 @@ pub(super) struct GltfFile<'a> {
 struct Shape {
     positions: Vec<[f32; 3]>,
     uvs: Vec<[f32; 2]>,
+    second_uvs: Vec<[f32; 2]>,
     indices: Vec<u32>,
     /// Some of it has no texture coordinates.
     lacks_uvs: bool,
+    /// Some of it has no second ones that can be read.
+    lacks_second_uvs: bool,
+    /// Some of its lists of triangles have no normals.
+    lacks_normals: bool,
 }
 
 impl<'a> GltfFile<'a> {
@@ -73,14 +78,7 @@ impl<'a> GltfFile<'a> {
         mesh: &gltf::Mesh<'g>,
         primitives: impl Iterator<Item = gltf::Primitive<'g>>,
     ) -> Result<Option<(MeshTriangles, bool)>, GltfMeshError> {
-        let mut shape = Shape::default();
-        for primitive in primitives {
-            let field = format!("meshes[{}].primitives[{}]", mesh.index(), primitive.index());
-            self.add(&mut shape, &primitive).map_err(|reason| self.content(&field, reason))?;
-        }
-        if shape.indices.is_empty() {
-            return Ok(None);
-        }
+        let Some(shape) = self.shape(mesh, primitives)? else { return Ok(None) };
         let has_uvs = !shape.lacks_uvs;
         let mesh_of_all = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::MAIN_WORLD)
             .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, shape.positions)
@@ -89,6 +87,44 @@ impl<'a> GltfFile<'a> {
         let triangles = MeshTriangles::from_mesh(&mesh_of_all)
             .map_err(|error| self.content(&format!("meshes[{}]", mesh.index()), error))?;
         Ok(Some((triangles, has_uvs)))
+    }
+
+    /// The same with its vertices as Bevy has them, and with the texture coordinates that there are.
+    pub(super) fn mesh<'g>(
+        &self,
+        mesh: &gltf::Mesh<'g>,
+        primitives: impl Iterator<Item = gltf::Primitive<'g>>,
+    ) -> Result<Option<Mesh>, GltfMeshError> {
+        let Some(shape) = self.shape(mesh, primitives)? else { return Ok(None) };
+        let whole = shape.indices.iter().all(|&corner| (corner as usize) < shape.positions.len());
+        let mut of_all = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::MAIN_WORLD)
+            .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, shape.positions)
+            .with_inserted_indices(Indices::U32(shape.indices));
+        if !shape.lacks_uvs {
+            of_all.insert_attribute(Mesh::ATTRIBUTE_UV_0, shape.uvs);
+        }
+        if !shape.lacks_second_uvs {
+            of_all.insert_attribute(Mesh::ATTRIBUTE_UV_1, shape.second_uvs);
+        }
+        // Bevy makes them flat.
+        if shape.lacks_normals && whole {
+            of_all.duplicate_vertices();
+        }
+        Ok(Some(of_all))
+    }
+
+    /// Primitives of a mesh, put together; `None` if none is made of triangles.
+    fn shape<'g>(
+        &self,
+        mesh: &gltf::Mesh<'g>,
+        primitives: impl Iterator<Item = gltf::Primitive<'g>>,
+    ) -> Result<Option<Shape>, GltfMeshError> {
+        let mut shape = Shape::default();
+        for primitive in primitives {
+            let field = format!("meshes[{}].primitives[{}]", mesh.index(), primitive.index());
+            self.add(&mut shape, &primitive).map_err(|reason| self.content(&field, reason))?;
+        }
+        Ok((!shape.indices.is_empty()).then_some(shape))
     }
 
     /// Adds the triangles of a primitive; points and lines have none.
@@ -110,6 +146,12 @@ impl<'a> GltfFile<'a> {
         if uvs.len() != positions.len() {
             return Err("has not as many `TEXCOORD_0` as `POSITION`".into());
         }
+        let second_uvs = primitive
+            .get(&Semantic::TexCoords(1))
+            .and_then(|uvs| self.vectors::<2>(&uvs).ok())
+            .filter(|uvs| uvs.len() == positions.len());
+        shape.lacks_second_uvs |= second_uvs.is_none();
+        shape.lacks_normals |= mode == Mode::Triangles && primitive.get(&Semantic::Normals).is_none();
         let corners = match primitive.indices() {
             Some(indices) => {
                 self.indices(&indices).map_err(|reason| format!("has `indices` whose accessor {reason}"))?
@@ -137,6 +179,7 @@ impl<'a> GltfFile<'a> {
         }
         shape.positions.extend(positions);
         shape.uvs.extend(uvs);
+        shape.second_uvs.extend(second_uvs.unwrap_or_default());
         Ok(())
     }
 

@@ -17,6 +17,7 @@ mod uri;
 use std::path::{Path, PathBuf};
 
 use bevy::math::{Affine3A, Mat4};
+use bevy::mesh::Mesh;
 
 use self::file::GltfFile;
 pub(crate) use self::uri::{data_uri, percent_decoded};
@@ -155,6 +156,20 @@ pub fn read_first_primitive(path: &Path) -> Result<MeshTriangles, GltfMeshError>
         Some((_, false)) => Err(file.content(field, "has no `TEXCOORD_0`")),
         None => Err(file.content(field, "has no triangles")),
     }
+}
+
+/// The same with its vertices and the texture coordinates that it has, first or second: what it takes to unwrap it as Bevy's
+/// would be.
+///
+/// # Errors
+/// [`GltfMeshError`]; also if it has no triangles.
+pub fn read_first_primitive_mesh(path: &Path) -> Result<Mesh, GltfMeshError> {
+    let file = GltfFile::open(path)?;
+    let Some(mesh) = file.gltf.document.meshes().next() else {
+        return Err(file.content("meshes", "is empty"));
+    };
+    file.mesh(&mesh, mesh.primitives().take(1))?
+        .ok_or_else(|| file.content("meshes[0].primitives[0]", "has no triangles"))
 }
 
 #[cfg(test)]

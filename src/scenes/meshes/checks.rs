@@ -4,6 +4,8 @@ use bevy::math::UVec2;
 use bevy::mesh::VertexAttributeValues;
 
 use super::*;
+use crate::collision::MeshTriangles;
+use crate::unwrap::{measure_overlap, shares_texels};
 
 /// A mesh as lists.
 pub(super) struct Parts {
@@ -122,6 +124,15 @@ fn textures_are_not_mirrored() {
             // Counter-clockwise outside is clockwise in an image whose rows go down.
             assert!((b - a).perp_dot(c - a) < 0.0, "{name} {triangle:?}");
         }
+    }
+}
+
+#[test]
+fn maps_lie_over_the_uvs_that_they_have() {
+    let car = ("car", car(3.0, 24).expect("valid"), 0);
+    for (name, mesh, _) in presets().chain([car]) {
+        let triangles = MeshTriangles::from_mesh(&mesh).expect("they can be hit");
+        assert!(!shares_texels(&triangles, 512), "{name}: {:?}", measure_overlap(&triangles, 512));
     }
 }
 
