@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
 use bevy_weathering::overlay::{
-    Overlays, Splat, SplatQueue, SplatStats, StampSpace, TileBins, Weatherable, Wrap,
+    OverlayUv, Overlays, Splat, SplatQueue, SplatStats, StampSpace, TileBins, Weatherable, Wrap,
 };
 use criterion::Criterion;
 
@@ -30,8 +30,13 @@ use crate::scene::Random;
 const SPLATS: usize = 100_000;
 const DEPTHS: [u32; 3] = [1, 8, 32];
 const ROUNDS: u32 = 3;
-const SURFACE: Weatherable =
-    Weatherable { map_size: 1024, wrap_u: Wrap::Clamp, wrap_v: Wrap::Clamp, stamps: StampSpace::Map };
+const SURFACE: Weatherable = Weatherable {
+    map_size: 1024,
+    wrap_u: Wrap::Clamp,
+    wrap_v: Wrap::Clamp,
+    stamps: StampSpace::Map,
+    uv: OverlayUv::Mesh,
+};
 
 /// Units of a splat's centre and radius in a texel.
 const SUBTEXELS: f32 = 256.0;
