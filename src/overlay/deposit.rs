@@ -211,7 +211,7 @@ fn throw_up(
     let speed = impact.velocity.dot(impact.normal).abs();
     let thrown_nl = (f64::from(water_nl) * f64::from(effect.splash)) as u32;
     let diameter = row.diameters_mm[usize::from(impact.class)];
-    if thrown_nl < 2 || new.waiting().len() + 2 > room || !splashes(diameter, speed) {
+    if thrown_nl < 2 * LEAST_THROWN_NL || new.waiting().len() + 2 > room || !splashes(diameter, speed) {
         return 0;
     }
     let ticks_left = (SPLASH_SECONDS * clock.hz() as f32).ceil() as u16;
@@ -237,6 +237,9 @@ fn throw_up(
     }
     thrown_nl
 }
+
+/// A drop of a millimetre: what is smaller stays where it is, rather than flying as mist.
+const LEAST_THROWN_NL: u32 = 524;
 
 /// Seconds that what is thrown up may fly.
 const SPLASH_SECONDS: f32 = 2.0;
