@@ -25,6 +25,7 @@ mod stamping;
 mod tiles;
 
 use bevy::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use atlas::StampAtlas;
@@ -43,7 +44,7 @@ pub use tiles::{TILE_SIZE, TileBins, TileHeader};
 ///
 /// Needs a mesh with texture coordinates. Where a `StandardMaterial` is on the entity, it is exchanged for its
 /// weathered form with the same settings.
-#[derive(Component, Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Component, Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq)]
 #[reflect(Component)]
 #[serde(deny_unknown_fields, default)]
 pub struct Weatherable {
@@ -58,7 +59,7 @@ pub struct Weatherable {
 }
 
 /// Where the stamps of a surface lie.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StampSpace {
     /// On the surface: round whatever the uvs do to it, across the borders of uv islands and never on a neighbour in the
     /// image. Takes 16 bytes a texel once something is painted, twice with a renderer. Surfaces that are posed have theirs on
@@ -70,7 +71,7 @@ pub enum StampSpace {
 }
 
 /// What happens to a stamp at an edge of the map.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Wrap {
     /// It goes on at the opposite edge; uvs outside 0..1 tile.
     #[default]

@@ -13,7 +13,7 @@ use crate::emitter::{EmissionSeed, EmitterState, NewParticles};
 use crate::matter::SurfaceMatter;
 use crate::overlay::{CpuMaps, Overlays, SurfaceTotals, SurfaceTraces, Weatherable};
 use crate::particle::Particles;
-use crate::scenario::{Digest, LoadedScenario, check_weather};
+use crate::scenario::{Digest, LoadedScenario, check_weather, rewind};
 use crate::weather::DryingClock;
 use crate::wetting::SurfaceWater;
 
@@ -81,6 +81,7 @@ impl SavedScene {
             return Err(value(&path, "effect of a particle", effect, format!("below {effects}")));
         }
 
+        rewind(world, state.tick);
         world.insert_resource(drying);
         world.insert_resource(state.weather);
         world.insert_resource(state.counts);
