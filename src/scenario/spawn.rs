@@ -8,8 +8,9 @@ use bevy::prelude::*;
 use bevy::render::RenderApp;
 
 use super::content::Content;
-use super::motion::{EmitterMotion, ScenarioCamera, move_camera, move_emitters};
-use super::{Digest, LoadedScenario, MeshSpec, ScenarioError, digest};
+use super::motion::{ScenarioCamera, move_camera};
+use super::timeline::{MaterialHandles, apply_events_plugin, camera_keys, emitter_motion};
+use super::{Digest, LoadedScenario, MeshSpec, ScenarioError};
 use crate::clock::ClockPlugin;
 use crate::collision::{BuildColliders, MeshColliders, NotWeatherable, SurfaceCollider};
 use crate::effect::{EffectTable, WeatherEffect};
@@ -17,7 +18,6 @@ use crate::emitter::{EmissionSeed, Emitter};
 use crate::material::{PlayedWetMap, Playing};
 use crate::overlay::{FramesWork, OverlayUv, PrepareStamps, TexelArea, Weatherable};
 use crate::particle::{Forces, ParticleConfig};
-use crate::schedule::{WeatheringSystems, WeatheringTick};
 use crate::unwrap::NotUnwrapped;
 use crate::wetting::{self, ExposureProgress, MeasureSurfaces};
 
@@ -86,15 +86,8 @@ impl Plugin for ScenarioPlugin {
                     .after(MeasureSurfaces)
                     .after(PrepareStamps),
             )
-            .add_systems(
-                WeatheringTick,
-                (
-                    // Emitters stand where they should before they emit.
-                    move_emitters.in_set(WeatheringSystems::First),
-                    digest::digest_impacts.in_set(WeatheringSystems::Last),
-                ),
-            )
             .add_systems(Update, move_camera);
+        apply_events_plugin(app, scenario);
         app.world_mut().resource_mut::<Time<Virtual>>().pause();
 
         let content = self.content.lock().ok().and_then(|mut content| content.take());
@@ -122,11 +115,7 @@ fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, loo
                 stream: index as u32,
                 enabled: false,
             },
-            EmitterMotion {
-                keys: spec.keys.clone(),
-                start: spec.start,
-                stop: spec.stop.unwrap_or(scenario.seconds),
-            },
+            emitter_motion(scenario, spec),
         ));
     }
     let mut materials = Vec::new();
@@ -174,6 +163,8 @@ fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, loo
             entity.insert((MeshMaterial3d(material.clone()), textures.clone()));
         }
     }
+    let handles = materials.into_iter().map(|(_, material, textures)| (material, textures));
+    world.insert_resource(MaterialHandles(handles.collect()));
     if looks {
         spawn_view(world, loaded, content.environment);
     }
@@ -204,7 +195,7 @@ fn spawn_view(
         Msaa::Sample4,
         Exposure { ev100: scenario.camera.ev100 },
         Projection::from(PerspectiveProjection { fov: scenario.camera.fov_deg.to_radians(), ..default() }),
-        ScenarioCamera { keys: scenario.camera.keys.clone() },
+        ScenarioCamera { keys: camera_keys(scenario) },
     ));
     let (Some(maps), Some(spec)) = (maps, &scenario.environment) else { return };
     let rotation = Quat::from_rotation_y(spec.turn_deg.to_radians());

@@ -23,7 +23,7 @@ use crate::cli::SandboxArgs;
 struct ScreenshotFolder(PathBuf);
 
 pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
-    let loaded = Scenario::load(&arguments.file)?;
+    let loaded = Scenario::load_variant(&arguments.file, arguments.variant.as_deref())?;
     require_adapter()?;
     if cfg!(target_os = "linux") && std::env::var_os("DISPLAY").is_none() {
         return Err("no display: DISPLAY is not set; use `weathering replay`, or start one (Xvfb)".into());
