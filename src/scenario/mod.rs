@@ -17,17 +17,19 @@ mod motion;
 mod reset;
 mod schema;
 mod spawn;
+mod switch;
 mod validate;
 
 pub use content::SurfaceMesh;
 pub use digest::{Digest, amounts_digest};
 pub use error::ScenarioError;
 pub use load::LoadedScenario;
-pub use motion::ScenarioCamera;
+pub use motion::{ByHand, ScenarioCamera};
 pub use reset::reset_scenario;
 pub use schema::{
     CameraKey, CameraSpec, EmitterKey, EmitterSpec, EnvironmentSpec, MaterialSpec, MeshSpec, Scenario,
     SunSpec, SurfaceSpec, SurfaceTextureSpec, TextureSpec, WeatherSpec, WetMapSpec,
 };
-pub use spawn::{ScenarioPlugin, ScenarioStatus, ScenarioSurface};
+pub use spawn::{AssetTree, ScenarioPart, ScenarioPlugin, ScenarioStatus, ScenarioSurface};
+pub use switch::{PreparedScenario, switch_scenario};
 pub(crate) use validate::check_weather;

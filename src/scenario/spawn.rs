@@ -43,7 +43,16 @@ impl ScenarioPlugin {
 
 /// The running scenario.
 #[derive(Resource, Debug, Clone)]
-struct CurrentScenario(LoadedScenario);
+pub(super) struct CurrentScenario(LoadedScenario);
+
+/// What a scenario has spawned: it goes when another takes its place.
+#[derive(Component, Debug, Default, Clone, Copy)]
+pub struct ScenarioPart;
+
+/// The folder that the app's asset server reads from, where it may be another than the scenario's tree: then files of the
+/// scenario are loaded by absolute paths, which the asset server must allow.
+#[derive(Resource, Debug, Clone)]
+pub struct AssetTree(pub std::path::PathBuf);
 
 /// How far the scenario is.
 #[derive(Resource, Debug, Default)]
@@ -68,15 +77,8 @@ pub struct ScenarioSurface {
 
 impl Plugin for ScenarioPlugin {
     fn build(&self, app: &mut App) {
-        let scenario = &self.scenario.scenario;
-        ClockPlugin { hz: scenario.tick_hz }.insert_clock(app);
-        app.insert_resource(EmissionSeed(self.seed.unwrap_or(scenario.seed)))
-            .insert_resource(Forces { gravity: scenario.gravity })
-            .insert_resource(scenario.weather())
-            .insert_resource(ParticleConfig { max_alive: scenario.max_particles })
-            .insert_resource(CurrentScenario(self.scenario.clone()))
-            .init_resource::<ScenarioStatus>()
-            .init_resource::<Digest>()
+        set_up(app.world_mut(), &self.scenario, self.seed);
+        app.init_resource::<Digest>()
             .add_systems(
                 PreUpdate,
                 watch_loading
@@ -94,7 +96,6 @@ impl Plugin for ScenarioPlugin {
                 ),
             )
             .add_systems(Update, move_camera);
-        app.world_mut().resource_mut::<Time<Virtual>>().pause();
 
         let content = self.content.lock().ok().and_then(|mut content| content.take());
         let Some(content) = content else { return };
@@ -103,12 +104,36 @@ impl Plugin for ScenarioPlugin {
     }
 }
 
-fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, looks: bool) {
+/// Clock, weather and limits of a scenario that begins. Virtual time stands still until all of it is there.
+pub(super) fn set_up(world: &mut World, loaded: &LoadedScenario, seed: Option<u64>) {
+    let scenario = &loaded.scenario;
+    ClockPlugin { hz: scenario.tick_hz }.insert_clock(world);
+    world.insert_resource(EmissionSeed(seed.unwrap_or(scenario.seed)));
+    world.insert_resource(Forces { gravity: scenario.gravity });
+    world.insert_resource(scenario.weather());
+    world.insert_resource(ParticleConfig { max_alive: scenario.max_particles });
+    world.insert_resource(CurrentScenario(loaded.clone()));
+    world.insert_resource(ScenarioStatus::Loading);
+    world.resource_mut::<Time<Virtual>>().pause();
+}
+
+/// What the asset server calls a file of the scenario.
+fn asset_path(world: &World, loaded: &LoadedScenario, path: &str) -> String {
+    match world.get_resource::<AssetTree>() {
+        Some(AssetTree(tree)) if *tree != loaded.tree => {
+            loaded.tree.join(path).to_string_lossy().into_owned()
+        }
+        _ => path.to_owned(),
+    }
+}
+
+pub(super) fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, looks: bool) {
     let scenario = &loaded.scenario;
     for (index, (spec, effect)) in scenario.emitters.iter().zip(content.effects).enumerate() {
         let handle = world.resource_mut::<Assets<WeatherEffect>>().add(effect.clone());
         world.resource_mut::<EffectTable>().insert(handle.clone(), effect);
         world.spawn((
+            ScenarioPart,
             Name::new(spec.name.clone()),
             Emitter {
                 effect: handle,
@@ -142,7 +167,8 @@ fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, loo
         let mesh = match (&spec.mesh, mesh) {
             (MeshSpec::File(path), _) => {
                 let label = GltfAssetLabel::Primitive { mesh: 0, primitive: 0 };
-                world.resource::<AssetServer>().load(label.from_asset(path.clone()))
+                let path = asset_path(world, loaded, path);
+                world.resource::<AssetServer>().load(label.from_asset(path))
             }
             (_, Some(mesh)) => world.resource_mut::<Assets<Mesh>>().add(mesh),
             (_, None) => continue,
@@ -150,6 +176,7 @@ fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, loo
         let transform = spec.transform();
         let surface = ScenarioSurface { index: index as u32, name: spec.name.clone() };
         let mut entity = world.spawn((
+            ScenarioPart,
             Name::new(spec.name.clone()),
             surface,
             spec.maps,
@@ -186,6 +213,7 @@ fn spawn_view(
     let scenario = &loaded.scenario;
     let [red, green, blue] = scenario.sun.color;
     world.spawn((
+        ScenarioPart,
         Name::new("sun"),
         DirectionalLight {
             illuminance: scenario.sun.illuminance,
@@ -198,6 +226,7 @@ fn spawn_view(
         Transform::default().looking_to(scenario.sun.direction, Vec3::Y),
     ));
     let mut camera = world.spawn((
+        ScenarioPart,
         Name::new("camera"),
         Camera3d::default(),
         Msaa::Sample4,

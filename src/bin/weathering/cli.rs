@@ -19,7 +19,7 @@ pub struct Cli {
 pub enum Command {
     /// Run a scenario without a window: pictures, maps, report.json
     Replay(ReplayArgs),
-    /// Open a scenario in a window
+    /// Open a scenario or a model in a window, to play with
     Sandbox(SandboxArgs),
     /// Make a wet map: what of a surface gets wet first
     #[command(subcommand)]
@@ -65,10 +65,10 @@ pub struct ReplayArgs {
 
 #[derive(Args, Debug)]
 pub struct SandboxArgs {
-    /// The scenario
+    /// A scenario (.ron), or a model by itself (.glb, .gltf)
     #[arg(default_value = "assets/scenarios/hose.ron")]
     pub file: PathBuf,
-    /// Folder for screenshots
+    /// Folder for screenshots and saved scenes
     #[arg(long, default_value = "out")]
     pub out: PathBuf,
 }
