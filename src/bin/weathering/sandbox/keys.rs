@@ -9,7 +9,7 @@ use super::ui::{Help, Note, keyboard_is_free};
 
 /// Every key and mouse button, and what it does.
 const KEYS: &[(&str, &str)] = &[
-    ("Left button", "what the tool does: spray, probe"),
+    ("Left button", "what the tool does: spray, probe, paint"),
     ("Right button", "turn the camera"),
     ("Middle button", "move the camera"),
     ("Wheel", "closer, farther; faster, slower in flight"),
@@ -17,6 +17,8 @@ const KEYS: &[(&str, &str)] = &[
     ("C", "orbit or flight"),
     ("F", "look at all of the scene"),
     ("H, I", "hose, probe"),
+    ("1 2 3 4", "brushes: wet, dry, dirty, clean"),
+    ("Ctrl+Z", "take a stroke back"),
     ("Space", "pause, go on"),
     ("N", "one tick"),
     ("R", "start over"),
@@ -63,7 +65,14 @@ fn choose(keys: Res<ButtonInput<KeyCode>>, mut settings: ResMut<Settings>, mut h
     if pressed(KeyCode::KeyC) {
         settings.flies = !settings.flies;
     }
-    for (key, tool) in [(KeyCode::KeyH, Tool::Hose), (KeyCode::KeyI, Tool::Probe)] {
+    for (key, tool) in [
+        (KeyCode::KeyH, Tool::Hose),
+        (KeyCode::KeyI, Tool::Probe),
+        (KeyCode::Digit1, Tool::Wet),
+        (KeyCode::Digit2, Tool::Dry),
+        (KeyCode::Digit3, Tool::Dirty),
+        (KeyCode::Digit4, Tool::Clean),
+    ] {
         if pressed(key) {
             settings.tool = tool;
         }

@@ -2,6 +2,7 @@
 //!
 //! Each file is a plugin of its own; those that have something to show add a panel to [`ui`].
 
+mod brush;
 mod camera;
 mod effects;
 mod emitters;
@@ -22,6 +23,7 @@ mod shots;
 mod theme;
 mod title;
 mod ui;
+mod undo;
 mod views;
 mod weather;
 mod widgets;
@@ -86,7 +88,7 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
 
 /// What is in the bar.
 fn hose_and_time(app: &mut App) {
-    app.add_plugins((pace::plugin, scenes::plugin, hose::plugin));
+    app.add_plugins((pace::plugin, scenes::plugin, hose::plugin, brush::plugin, undo::plugin));
 }
 
 /// The other panels.

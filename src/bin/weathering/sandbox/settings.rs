@@ -31,6 +31,8 @@ pub struct Settings {
     pub tool: Tool,
     /// The hose in the hand.
     pub hose: HoseSettings,
+    /// The brushes.
+    pub brush: BrushSettings,
     /// The camera flies, and does not turn around a point.
     pub flies: bool,
     /// What is drawn over the scene.
@@ -45,6 +47,35 @@ pub enum Tool {
     Hose,
     /// Asks how wet it is, and selects the surface.
     Probe,
+    /// Brings water.
+    Wet,
+    /// Takes water away.
+    Dry,
+    /// Brings dust.
+    Dirty,
+    /// Takes dust, mud and snow away.
+    Clean,
+}
+
+/// The brushes.
+#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[serde(default)]
+pub struct BrushSettings {
+    /// Metres.
+    pub radius: f32,
+    /// How much a touch does, 0..=1.
+    pub strength: f32,
+}
+
+impl BrushSettings {
+    /// Ranges of radius and strength.
+    pub const RANGES: [(f32, f32); 2] = [(0.005, 5.0), (0.01, 1.0)];
+}
+
+impl Default for BrushSettings {
+    fn default() -> Self {
+        Self { radius: 0.12, strength: 0.3 }
+    }
 }
 
 /// The hose in the hand.
@@ -100,6 +131,7 @@ impl Default for Settings {
             panel: "Scenes".into(),
             tool: Tool::default(),
             hose: HoseSettings::default(),
+            brush: BrushSettings::default(),
             flies: false,
             views: DebugViews::default(),
         }
@@ -119,6 +151,10 @@ impl Settings {
         hose.nozzle_mm = within(hose.nozzle_mm, nozzle, default.nozzle_mm);
         hose.spread_deg = within(hose.spread_deg, spread, default.spread_deg);
         hose.rate = within(hose.rate, rate, default.rate);
+        let (brush, default) = (&mut self.brush, BrushSettings::default());
+        let [radius, strength] = BrushSettings::RANGES;
+        brush.radius = within(brush.radius, radius, default.radius);
+        brush.strength = within(brush.strength, strength, default.strength);
         self
     }
 
