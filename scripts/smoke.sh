@@ -117,9 +117,9 @@ for x in 30 80 130 190 250; do
 done
 xdotool key F1
 shot "the help"
-xdotool key F1 key Tab
+xdotool key F1 key u
 shot "no panels"
-xdotool key Tab key space
+xdotool key u key space
 await "a pause" 20 titled "(paused)"
 xdotool key n key n key r
 shot "one tick, started over"

@@ -8,6 +8,7 @@ use bevy_weathering::collision::CollisionScene;
 use bevy_weathering::scenario::ScenarioCamera;
 
 use super::settings::Settings;
+use super::split::{self, Split};
 use super::ui::{UiInput, keyboard_is_free};
 
 /// Radians per pixel.
@@ -83,7 +84,7 @@ impl View {
     }
 
     /// Sees a box, from where it looks from; `fov`: vertical, radians.
-    pub fn frame(&mut self, (low, high): (Vec3, Vec3), fov: f32) {
+    fn frame(&mut self, (low, high): (Vec3, Vec3), fov: f32) {
         let radius = ((high - low).length() * 0.5).max(0.01);
         self.target = (low + high) * 0.5;
         self.distance = (radius / (fov * 0.5).sin().max(0.05)).clamp(0.05, 2000.0);
@@ -157,18 +158,19 @@ fn fly(keys: Res<ButtonInput<KeyCode>>, time: Res<Time<Real>>, mut views: Query<
 fn frame_scene(
     keys: Res<ButtonInput<KeyCode>>,
     scene: Res<CollisionScene>,
+    split: Option<Res<Split>>,
     mut views: Query<(&mut View, &Projection)>,
 ) {
     if !keys.just_pressed(KeyCode::KeyF) || scene.is_empty() {
         return;
     }
     for (mut view, projection) in &mut views {
-        view.frame(scene.bounds(), field_of_view(projection));
+        view.frame(split::bounds(split.as_deref(), &scene), field_of_view(projection));
     }
 }
 
 /// Vertical, radians.
-pub fn field_of_view(projection: &Projection) -> f32 {
+fn field_of_view(projection: &Projection) -> f32 {
     match projection {
         Projection::Perspective(perspective) => perspective.fov,
         _ => PerspectiveProjection::default().fov,

@@ -8,6 +8,7 @@ use bevy_weathering::scenario::{ByHand, ScenarioPart};
 
 use super::effects;
 use super::hose::InHand;
+use super::split::CopyOf;
 use super::ui::{AddPanel, Place};
 use super::weather::OwnRain;
 use super::widgets::number;
@@ -25,7 +26,7 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     }
     // Those in the hand and over the scene have panels of their own.
     let mut query =
-        world.query_filtered::<(Entity, &Emitter, Option<&Name>), (Without<InHand>, Without<OwnRain>)>();
+        world.query_filtered::<(Entity, &Emitter, Option<&Name>), (Without<InHand>, Without<OwnRain>, Without<CopyOf>)>();
     let mut all: Vec<(u32, Entity, String)> = query
         .iter(world)
         .map(|(entity, emitter, name)| {

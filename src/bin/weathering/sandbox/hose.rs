@@ -48,6 +48,10 @@ fn point(
     pointed.held = buttons.pressed(MouseButton::Left) && (pointed.held || pointed.pressed);
     let cursor = window.single().ok().and_then(Window::cursor_position);
     pointed.ray = cursor.zip(cameras.iter().next()).and_then(|(cursor, (camera, transform))| {
+        // The part of the window that is another camera's is not pointed at.
+        if !camera.logical_viewport_rect().is_some_and(|rect| rect.contains(cursor)) {
+            return None;
+        }
         // The eye and not the near plane: what is close is hit, too.
         let ray = camera.viewport_to_world(transform, cursor).ok()?;
         Some(Ray3d { origin: transform.translation(), direction: ray.direction })

@@ -22,7 +22,7 @@ const KEYS: &[(&str, &str)] = &[
     ("Space", "pause, go on"),
     ("N", "one tick"),
     ("R", "start over"),
-    ("Tab", "hide panels, show them"),
+    ("U", "hide panels, show them"),
     ("M, P", "maps, plots"),
     ("F12", "picture without panels"),
     ("F11", "begin, end a sequence of pictures"),
@@ -53,7 +53,7 @@ fn choose(keys: Res<ButtonInput<KeyCode>>, mut settings: ResMut<Settings>, mut h
     if pressed(KeyCode::F1) || pressed(KeyCode::Slash) {
         help.0 = !help.0;
     }
-    if pressed(KeyCode::Tab) {
+    if pressed(KeyCode::KeyU) {
         settings.panels = !settings.panels;
     }
     if pressed(KeyCode::KeyM) {

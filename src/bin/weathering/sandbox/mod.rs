@@ -20,6 +20,7 @@ mod scenes;
 mod selection;
 mod settings;
 mod shots;
+mod split;
 mod theme;
 mod title;
 mod ui;

@@ -12,8 +12,8 @@ use bevy_weathering::scenario::{
     LoadedScenario, PreparedScenario, Scenario, ScenarioStatus, switch_scenario,
 };
 
-use super::model;
 use super::ui::Note;
+use super::{model, split};
 
 /// What is open.
 #[derive(Resource)]
@@ -67,6 +67,7 @@ fn finish(world: &mut World) {
         None => world.resource_mut::<Opening>().0 = Some((file, task)),
         Some(Ok(prepared)) => {
             let (loaded, is_model) = (prepared.scenario().clone(), model::is_model(&file));
+            split::end(world);
             switch_scenario(world, prepared);
             model::light_shade(world, is_model);
             if is_model {

@@ -20,6 +20,7 @@ use bevy_weathering::scenario::{LoadedScenario, ScenarioStatus, ScenarioSurface,
 use super::hose::InHand;
 use super::open::Opened;
 use super::shots::OutFolder;
+use super::split::Split;
 use super::ui::Note;
 use super::weather::OwnRain;
 
@@ -56,6 +57,9 @@ fn obstacle(world: &mut World) -> Option<&'static str> {
         return Some("A model that was opened by itself has no scenario to be saved with.");
     }
     let rows = opened.effects;
+    if world.contains_resource::<Split>() {
+        return Some("End the comparison first: the copy is no part of the scenario.");
+    }
     let mut rain = world.query_filtered::<(), With<OwnRain>>();
     if rain.iter(world).next().is_some() {
         return Some("Switch the rain over the scene off: it is no part of the scenario.");
@@ -96,7 +100,8 @@ pub fn show(ui: &mut egui::Ui, world: &mut World) {
             }
         }
     }
-    let is_saved = path.join("state.ron").is_file() && !world.resource::<Opened>().is_model;
+    let is_alone = !world.resource::<Opened>().is_model && !world.contains_resource::<Split>();
+    let is_saved = is_alone && path.join("state.ron").is_file();
     if is_saved && ui.button("Go on from there").on_hover_text("Of the same scenario only").clicked() {
         if let Err(error) = begin_restoring(world, &path) {
             world.resource_mut::<Note>().complain(error.to_string());

@@ -14,7 +14,7 @@ use bevy_egui::{
 };
 
 use super::settings::Settings;
-use super::{keys, theme};
+use super::{keys, split, theme};
 
 /// Draws a panel.
 pub type Show = fn(&mut egui::Ui, &mut World);
@@ -179,6 +179,7 @@ fn draw(world: &mut World, mut is_dressed: Local<bool>) {
         }
     }
     let free = root.available_rect_before_wrap();
+    split::show_divider(&context, free, world);
     show_note(&context, free, world.resource::<Note>());
     let mut help = world.resource::<Help>().0;
     if help {

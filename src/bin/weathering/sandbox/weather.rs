@@ -7,6 +7,7 @@ use bevy_weathering::emitter::{Emitter, EmitterShape, Flow};
 use bevy_weathering::weather::{DryingClock, Weather};
 
 use super::effects;
+use super::split::{self, CopyOf, Split};
 use super::ui::{AddPanel, Place};
 use super::widgets::number;
 
@@ -118,7 +119,7 @@ fn show_rain(ui: &mut egui::Ui, world: &mut World) {
         return;
     }
     *world.resource_mut::<Rain>() = rain.clone();
-    let mut emitters = world.query_filtered::<Entity, With<OwnRain>>();
+    let mut emitters = world.query_filtered::<Entity, (With<OwnRain>, Without<CopyOf>)>();
     let clouds: Vec<Entity> = emitters.iter(world).collect();
     if rain.mm_per_h <= 0.0 {
         clouds.into_iter().for_each(|cloud| {
@@ -126,7 +127,8 @@ fn show_rain(ui: &mut egui::Ui, world: &mut World) {
         });
         return;
     }
-    let (low, high) = world.resource::<CollisionScene>().bounds();
+    let scene = world.resource::<CollisionScene>();
+    let (low, high) = split::bounds(world.get_resource::<Split>(), scene);
     let Some((half_size, place)) = above(low, high) else { return };
     let Some(effect) = effects::shipped(world, &rain.effect) else { return };
     let emitter = Emitter {
