@@ -9,7 +9,7 @@ use bevy_weathering::overlay::Weatherable;
 use bevy_weathering::scenario::{
     AssetTree, CameraKey, CameraSpec, LoadedScenario, Scenario, ScenarioPart, SunSpec, WeatherSpec,
 };
-use bevy_weathering::scenes::gltf_mesh::{GltfMeshError, read_meshes};
+use bevy_weathering::scenes::gltf_mesh::read_meshes;
 
 /// Texels of a map per metre of the mesh's size, before they are rounded.
 const TEXELS_PER_METRE: f32 = 256.0;
@@ -29,12 +29,12 @@ pub fn is_model(file: &Path) -> bool {
 }
 
 /// A scenario with nothing in it but light, seen from where all of the model is seen. Reads the model's meshes, so that what
-/// is wrong with it is known before anything is shown.
+/// is wrong with it is known before anything is shown, and keeps the files that it names within its folder.
 ///
 /// # Errors
-/// [`GltfMeshError`] with the file.
-pub fn bare_scenario(file: &Path) -> Result<LoadedScenario, GltfMeshError> {
-    let meshes = read_meshes(file)?;
+/// What is wrong, with the file.
+pub fn bare_scenario(file: &Path) -> Result<LoadedScenario, String> {
+    let meshes = read_meshes(file).map_err(|error| error.to_string())?;
     let corners = meshes.iter().flat_map(|mesh| {
         let corners = mesh.triangles.positions.iter().flatten();
         corners.map(move |&corner| mesh.transform.transform_point3(corner))
@@ -62,7 +62,10 @@ pub fn bare_scenario(file: &Path) -> Result<LoadedScenario, GltfMeshError> {
         surfaces: Vec::new(),
         emitters: Vec::new(),
     };
-    Ok(LoadedScenario { scenario, file: file.into(), tree, hash: String::new() })
+    let loaded = LoadedScenario { scenario, file: file.into(), tree, hash: String::new() };
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    loaded.validate_gltf("model", &name).map_err(|error| error.to_string())?;
+    Ok(loaded)
 }
 
 /// Light in the shade: of a model by itself, which has nothing around it, or of a scene.
@@ -156,7 +159,25 @@ mod tests {
         let key = loaded.scenario.camera.keys[0];
         assert!((key.eye - key.target).length() > 0.05 && key.target.is_finite());
         assert!(loaded.tree.ends_with("models"));
-        let missing = bare_scenario(Path::new("no/such.glb")).unwrap_err().to_string();
+        let missing = bare_scenario(Path::new("no/such.glb")).unwrap_err();
         assert!(missing.contains("such.glb"), "{missing}");
+        // A picture from elsewhere.
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("model.gltf");
+        let positions = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+        std::fs::write(folder.path().join("corners.bin"), positions.map(f32::to_le_bytes).as_flattened())
+            .unwrap();
+        let model = r#"{
+            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+                "min": [0, 0, 0], "max": [1, 1, 0]}],
+            "bufferViews": [{"buffer": 0, "byteLength": 36}],
+            "buffers": [{"uri": "corners.bin", "byteLength": 36}],
+            "images": [{"uri": "PLACE"}]
+        }"#;
+        std::fs::write(&file, model.replace("PLACE", "../secret.png")).unwrap();
+        let outside = bare_scenario(&file).unwrap_err();
+        assert!(outside.contains("secret.png"), "{outside}");
     }
 }

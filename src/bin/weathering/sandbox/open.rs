@@ -44,7 +44,7 @@ pub fn plugin(app: &mut App) {
 /// Reads a scenario, or what stands for one around a model.
 pub fn load(file: &Path) -> Result<LoadedScenario, String> {
     if model::is_model(file) {
-        model::bare_scenario(file).map_err(|error| error.to_string())
+        model::bare_scenario(file)
     } else {
         Scenario::load(file).map_err(|error| error.to_string())
     }
