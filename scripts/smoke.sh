@@ -105,6 +105,14 @@ for _ in 1 2 3 4 5 6 7 8; do xdotool mousemove_relative 8 2; sleep 0.2; done
 xdotool mouseup 1
 shot "the hose in the hand"
 
+# A brush, and its stroke taken back.
+xdotool key 1 mousemove 660 340 mousedown 1
+for _ in 1 2 3 4 5 6; do xdotool mousemove_relative 12 3; sleep 0.2; done
+xdotool mouseup 1
+shot "a stroke of a brush"
+xdotool key ctrl+z
+shot "a stroke taken back"
+
 # Probe, maps, plots, help; all panels by their tabs, which lie in the first rows of the left panel.
 xdotool key i mousemove 640 360 click 1 key m key p
 shot "maps and plots"

@@ -2,10 +2,10 @@
 
 use bevy::prelude::*;
 use bevy_egui::egui;
-use bevy_weathering::scenario::reset_scenario;
 
+use super::pace::start_over;
 use super::settings::{Settings, Tool};
-use super::ui::{Help, Note, keyboard_is_free};
+use super::ui::{Help, keyboard_is_free};
 
 /// Every key and mouse button, and what it does.
 const KEYS: &[(&str, &str)] = &[
@@ -34,10 +34,9 @@ pub fn plugin(app: &mut App) {
     app.add_systems(Update, (reset, leave, choose).run_if(keyboard_is_free));
 }
 
-fn reset(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands, mut note: ResMut<Note>) {
+fn reset(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
     if keys.just_pressed(KeyCode::KeyR) {
-        commands.queue(reset_scenario);
-        note.tell("started over");
+        commands.queue(start_over);
     }
 }
 

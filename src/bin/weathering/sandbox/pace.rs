@@ -115,6 +115,13 @@ fn one_tick(world: &mut World) {
     }
 }
 
+/// Dry, at the first tick.
+pub fn start_over(world: &mut World) {
+    reset_scenario(world);
+    world.insert_resource(ShownTime::Now);
+    world.resource_mut::<Note>().tell("started over");
+}
+
 fn show(ui: &mut egui::Ui, world: &mut World) {
     let is_ready = matches!(*world.resource::<ScenarioStatus>(), ScenarioStatus::Ready);
     if !is_ready {
@@ -131,9 +138,7 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
         one_tick(world);
     }
     if ui.button("Start over").on_hover_text("Dry, at the first tick (R)").clicked() {
-        reset_scenario(world);
-        world.insert_resource(ShownTime::Now);
-        world.resource_mut::<Note>().tell("started over");
+        start_over(world);
     }
     let mut pace = world.resource_mut::<Pace>();
     let speed = egui::Slider::new(&mut pace.wanted, SPEEDS.0..=SPEEDS.1).logarithmic(true).suffix(" x");
@@ -156,7 +161,7 @@ fn show_time(ui: &mut egui::Ui, world: &mut World) {
     };
     // So far ahead that what is wet has dried.
     let end = (now + 600.0).max(at) * 1.2;
-    let slider = egui::Slider::new(&mut at, 0.0..=end).logarithmic(true).suffix(" s");
+    let slider = egui::Slider::new(&mut at, 0.0..=end).logarithmic(true).smallest_positive(1.0).suffix(" s");
     // Decimals that are cut off would count as changes.
     let slider = ui.add(slider.custom_formatter(|seconds, _| format!("{seconds:.1}")));
     let slider =

@@ -102,10 +102,11 @@ pub fn show(ui: &mut egui::Ui, world: &mut World) {
     }
     let is_alone = !world.resource::<Opened>().is_model && !world.contains_resource::<Split>();
     let is_saved = is_alone && path.join("state.ron").is_file();
-    if is_saved && ui.button("Go on from there").on_hover_text("Of the same scenario only").clicked() {
-        if let Err(error) = begin_restoring(world, &path) {
-            world.resource_mut::<Note>().complain(error.to_string());
-        }
+    if is_saved
+        && ui.button("Go on from there").on_hover_text("Of the same scenario only").clicked()
+        && let Err(error) = begin_restoring(world, &path)
+    {
+        world.resource_mut::<Note>().complain(error.to_string());
     }
 }
 
