@@ -1,5 +1,7 @@
 //! Building the scene, and waiting until all of it is there.
 
+use std::path::PathBuf;
+
 use bevy::asset::LoadState;
 use bevy::camera::Exposure;
 use bevy::gltf::GltfAssetLabel;
@@ -43,7 +45,7 @@ impl ScenarioPlugin {
 
 /// The running scenario.
 #[derive(Resource, Debug, Clone)]
-pub(super) struct CurrentScenario(LoadedScenario);
+struct CurrentScenario(LoadedScenario);
 
 /// What a scenario has spawned: it goes when another takes its place.
 #[derive(Component, Debug, Default, Clone, Copy)]
@@ -52,7 +54,7 @@ pub struct ScenarioPart;
 /// The folder that the app's asset server reads from, where it may be another than the scenario's tree: then files of the
 /// scenario are loaded by absolute paths, which the asset server must allow.
 #[derive(Resource, Debug, Clone)]
-pub struct AssetTree(pub std::path::PathBuf);
+pub struct AssetTree(pub PathBuf);
 
 /// How far the scenario is.
 #[derive(Resource, Debug, Default)]

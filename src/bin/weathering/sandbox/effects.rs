@@ -64,7 +64,8 @@ fn in_use(world: &mut World) -> Vec<(String, Handle<WeatherEffect>)> {
     let shipped = &world.resource::<Shipped>().0;
     let rows = world.resource::<EffectTable>().rows();
     let named = |handle: &Handle<WeatherEffect>| {
-        let by_name = SHIPPED.iter().zip(shipped).find(|(_, known)| known.as_ref() == Some(handle));
+        let by_name =
+            SHIPPED.iter().zip(shipped).find(|(_, known)| matches!(known, Some(known) if known == handle));
         let by_emitter = of_emitters.iter().find(|(_, effect)| effect == handle);
         by_name
             .map(|((name, _), _)| (*name).to_owned())
