@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod bake;
+pub mod brush;
 pub mod clock;
 pub mod collision;
 pub mod effect;
@@ -27,6 +28,7 @@ use bevy::prelude::*;
 /// What a Bevy app needs to get things wet.
 pub mod prelude {
     pub use crate::WeatheringPlugins;
+    pub use crate::brush::{Brush, BrushKind, BrushQueue};
     pub use crate::clock::WeatheringClock;
     pub use crate::collision::{ReportImpacts, SurfaceImpact};
     pub use crate::effect::WeatherEffect;
@@ -53,6 +55,7 @@ pub mod prelude {
 /// | [`DepositPlugin`](overlay::DepositPlugin) | turns impacts into splats | no |
 /// | [`MatterPlugin`](matter::MatterPlugin) | gives surfaces room for dust, mud and snow | no |
 /// | [`WettingPlugin`](wetting::WettingPlugin) | absorbs, moves and dries water | no |
+/// | [`BrushPlugin`](brush::BrushPlugin) | wets, dries, dirties and cleans by hand | no |
 /// | [`GpuOverlayPlugin`](overlay::GpuOverlayPlugin) | paints splats into maps | yes |
 /// | [`WaterUploadPlugin`](wetting::gpu::WaterUploadPlugin) | sends water to be drawn | yes |
 /// | [`ParticleDrawPlugin`](particle::ParticleDrawPlugin) | draws particles in flight | yes |
@@ -75,6 +78,7 @@ impl PluginGroup for WeatheringPlugins {
             .add(overlay::DepositPlugin)
             .add(matter::MatterPlugin)
             .add(wetting::WettingPlugin)
+            .add(brush::BrushPlugin)
             .add(overlay::GpuOverlayPlugin)
             .add(wetting::gpu::WaterUploadPlugin)
             .add(particle::ParticleDrawPlugin)

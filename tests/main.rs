@@ -48,6 +48,8 @@ mod save;
 mod schedule;
 /// Marks across the borders of uv islands.
 mod seams;
+/// Events of scenarios, includes, variants, checks.
+mod timeline;
 /// The smaller tools of the program.
 mod tools;
 /// Wet maps, made as their users make them.

@@ -27,6 +27,7 @@ mod stamping;
 mod tiles;
 
 use bevy::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use atlas::StampAtlas;
@@ -46,7 +47,7 @@ pub use tiles::{TILE_SIZE, TileBins, TileHeader};
 ///
 /// Needs a mesh with texture coordinates. Where a `StandardMaterial` is on the entity, it is exchanged for its
 /// weathered form with the same settings.
-#[derive(Component, Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Component, Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq)]
 #[reflect(Component)]
 #[serde(deny_unknown_fields, default)]
 pub struct Weatherable {
@@ -61,7 +62,7 @@ pub struct Weatherable {
 }
 
 /// Where the stamps of a surface lie.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StampSpace {
     /// On the surface: round whatever the uvs do to it, across the borders of uv islands and never on a neighbour in the
     /// image. Takes 16 bytes a texel once something is painted, twice with a renderer. On surfaces that are posed a stamp is round
@@ -73,7 +74,7 @@ pub enum StampSpace {
 }
 
 /// What happens to a stamp at an edge of the map.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Wrap {
     /// It goes on at the opposite edge; uvs outside 0..1 tile.
     #[default]

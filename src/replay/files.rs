@@ -24,20 +24,36 @@ pub(super) fn require_writable(folder: &Path) -> Result<(), ReplayError> {
     writable.map(drop).map_err(|source| ReplayError::Write { path: folder.into(), source })
 }
 
+/// The file of a picture by its number.
+pub(super) fn frame_file(number: u32) -> String {
+    format!("frame_{number:05}.png")
+}
+
+/// The file of a picture that an event asked for.
+pub(super) fn capture_file(name: &str) -> String {
+    format!("capture_{name}.png")
+}
+
 /// Removes what an earlier run left in the folder, so that nothing of it stands beside this one's files: pictures from
-/// number `first` on, maps and report. The pictures before are those of the run that this one goes on with.
+/// number `first` on, captures but for those in `kept`, maps and report. The pictures before are those of the run that this
+/// one goes on with.
 ///
 /// # Errors
 /// [`ReplayError::Write`] with the file.
-pub(super) fn remove_earlier_run(folder: &Path, first: u32) -> Result<(), ReplayError> {
+pub(super) fn remove_earlier_run(folder: &Path, first: u32, kept: &[String]) -> Result<(), ReplayError> {
     let is_frame = |name: &str| {
         let number = name.strip_prefix("frame_").and_then(|name| name.strip_suffix(".png"));
         let is_number = |text: &&str| text.len() >= 5 && text.bytes().all(|byte| byte.is_ascii_digit());
         number.filter(is_number).is_some_and(|text| text.parse::<u32>().is_ok_and(|number| number >= first))
     };
+    let is_capture = |name: &str| {
+        name.starts_with("capture_") && name.ends_with(".png") && !kept.iter().any(|file| file == name)
+    };
     let is_map = |name: &str| MAP_NAMES.iter().any(|map| name.ends_with(&format!("_{map}.png")));
-    let ours: [(&Path, &dyn Fn(&str) -> bool); 2] =
-        [(folder, &|name| name == "report.json" || is_frame(name)), (&folder.join("maps"), &is_map)];
+    let ours: [(&Path, &dyn Fn(&str) -> bool); 2] = [
+        (folder, &|name| name == "report.json" || is_frame(name) || is_capture(name)),
+        (&folder.join("maps"), &is_map),
+    ];
     for (folder, is_ours) in ours {
         let Ok(entries) = fs::read_dir(folder) else { continue };
         for entry in entries.filter_map(Result::ok) {
@@ -67,27 +83,35 @@ mod tests {
     #[test]
     fn an_earlier_run_is_removed_and_nothing_else() {
         let folder = tempfile::tempdir().unwrap();
-        let ours =
-            ["report.json", "frame_00000.png", "frame_123456.png", "maps/a_b_film.png", "maps/a_since.png"];
+        let ours = [
+            "report.json",
+            "frame_00000.png",
+            "frame_123456.png",
+            "maps/a_b_film.png",
+            "maps/a_since.png",
+            "capture_a.png",
+        ];
         let others = ["frame_1.png", "frame_abcde.png", "notes.txt", "maps/mine.png"];
         for name in ours.iter().chain(&others) {
             write_atomic(&folder.path().join(name), b"x").unwrap();
         }
-        remove_earlier_run(folder.path(), 0).unwrap();
+        remove_earlier_run(folder.path(), 0, &[]).unwrap();
         assert!(ours.iter().all(|name| !folder.path().join(name).exists()));
         assert!(others.iter().all(|name| folder.path().join(name).exists()));
-        remove_earlier_run(&folder.path().join("nowhere"), 0).unwrap();
+        remove_earlier_run(&folder.path().join("nowhere"), 0, &[]).unwrap();
     }
 
     #[test]
     fn pictures_of_the_run_that_is_gone_on_with_stay() {
         let folder = tempfile::tempdir().unwrap();
-        let (before, after) =
-            (["frame_00000.png", "frame_00011.png"], ["frame_00012.png", "frame_100000.png"]);
+        let (before, after) = (
+            ["frame_00000.png", "frame_00011.png", "capture_a.png"],
+            ["frame_00012.png", "frame_100000.png"],
+        );
         for name in before.iter().chain(&after) {
             write_atomic(&folder.path().join(name), b"x").unwrap();
         }
-        remove_earlier_run(folder.path(), 12).unwrap();
+        remove_earlier_run(folder.path(), 12, &[capture_file("a")]).unwrap();
         assert!(before.iter().all(|name| folder.path().join(name).exists()));
         assert!(after.iter().all(|name| !folder.path().join(name).exists()));
     }

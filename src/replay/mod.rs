@@ -22,7 +22,7 @@ use crate::clock::WeatheringClock;
 use crate::overlay::SurfaceTotals;
 use crate::picture::PictureError;
 use crate::save::{ColorMaps, SaveError, SavedScene};
-use crate::scenario::{LoadedScenario, ScenarioError, ScenarioPlugin, ScenarioStatus};
+use crate::scenario::{LoadedScenario, ScenarioError, ScenarioPlugin, ScenarioStatus, captures};
 
 pub use app::{require_adapter, task_pools};
 pub use capture::write_png;
@@ -35,7 +35,7 @@ pub use report::{ParticleReport, Report, SurfaceReport, Timing, WaterReport, Wor
 pub struct ReplayOptions {
     /// The scenario.
     pub scenario: LoadedScenario,
-    /// Folder for `frame_*.png`, `maps/` and `report.json`; made if missing. `None` writes nothing.
+    /// Folder for `frame_*.png`, `capture_*.png`, `maps/` and `report.json`; made if missing. `None` writes nothing.
     pub out: Option<PathBuf>,
     /// Pictures per second of weather time; at least 1. Without a renderer there are none.
     pub fps: u32,
@@ -164,18 +164,29 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
         |tick: u32| (u64::from(tick) * u64::from(options.fps)).div_ceil(u64::from(clock.hz())) as u32;
     // Those before were drawn before it was saved.
     let frames = frame_at(tick)..(if options.render { frame_at(ticks) } else { 0 });
+    let captures = captures(&options.scenario.scenario);
+    let begins = captures.partition_point(|(due, _)| *due < tick || (*due == tick && tick > 0));
+    let (taken, to_take) = captures.split_at(begins);
     if let Some(folder) = &options.save {
         SavedScene::check_folder(folder)?;
     }
     if let Some(out) = &options.out {
         files::require_writable(out)?;
-        files::remove_earlier_run(out, frames.start)?;
+        let taken: Vec<_> = taken.iter().map(|(_, name)| files::capture_file(name)).collect();
+        files::remove_earlier_run(out, frames.start, &taken)?;
     }
     let loaded = begun.elapsed();
 
-    for frame in frames.clone() {
-        let due = (u64::from(frame) * u64::from(clock.hz()) / u64::from(options.fps)) as u32;
-        run.capture(frame)?;
+    let due_at = |frame: u32| (u64::from(frame) * u64::from(clock.hz()) / u64::from(options.fps)) as u32;
+    let mut pictures: Vec<_> =
+        frames.clone().map(|frame| (due_at(frame), files::frame_file(frame))).collect();
+    if options.render {
+        let named = to_take.iter().filter(|(due, _)| *due <= ticks);
+        pictures.extend(named.map(|(due, name)| (*due, files::capture_file(name))));
+        pictures.sort_by_key(|(due, _)| *due);
+    }
+    for (due, file) in pictures {
+        run.capture(file)?;
         run.step(due - tick)?;
         tick = due;
         progress(Progress { tick, ticks });

@@ -10,7 +10,7 @@ use crate::effect::EffectTable;
 use crate::emitter::{EmissionSeed, NewParticles};
 use crate::overlay::SurfaceTotals;
 use crate::particle::{Particle, ParticleCounts, Particles, WaterCounts};
-use crate::scenario::{Digest, ScenarioSurface, amounts_digest};
+use crate::scenario::{Digest, ExpectationOutcome, Expectations, ScenarioSurface, amounts_digest};
 use crate::wetting::{DripEffect, WettingStats};
 
 /// `report.json`.
@@ -18,6 +18,8 @@ use crate::wetting::{DripEffect, WettingStats};
 pub struct Report {
     /// File name of the scenario.
     pub scenario: String,
+    /// The variant of it that was chosen.
+    pub variant: Option<String>,
     /// The seed that was used.
     pub seed: u64,
     /// Ticks run.
@@ -32,6 +34,8 @@ pub struct Report {
     pub work: WorkReport,
     /// In the order of the scenario.
     pub surfaces: Vec<SurfaceReport>,
+    /// What was expected, and what came of it; in order of time.
+    pub expectations: Vec<ExpectationOutcome>,
     /// Hash over all impacts and all amounts; see [`amounts_digest`].
     pub digest: String,
     /// Wall-clock time and pictures of this run. Nothing else differs from run to run but `work`, after a resume.
@@ -72,6 +76,10 @@ pub struct SurfaceReport {
     pub evaporated_mm3: f64,
     /// Left it as drips, mm³.
     pub dripped_mm3: f64,
+    /// Water that brushes brought, mm³.
+    pub painted_mm3: f64,
+    /// Water that brushes took, mm³.
+    pub wiped_mm3: f64,
     /// Part of its area that looks wet, 0..=1.
     pub wet_fraction: f64,
     /// Loose grains on it, mm³.
@@ -84,21 +92,30 @@ pub struct SurfaceReport {
     pub washed_off_mm3: f64,
     /// Snow that slid off it, mm³ of water.
     pub slid_off_mm3: f64,
+    /// Dust and mud that brushes took, mm³.
+    pub wiped_soil_mm3: f64,
+    /// Snow that brushes took, mm³ of water.
+    pub wiped_snow_mm3: f64,
 }
 
-/// Where all the water is, mm³: `emitted + melted = on_surfaces + evaporated + run_off + missed + in_flight`, in whole nanolitres.
+/// Where all the water is, mm³: `emitted + melted + painted = on_surfaces + evaporated + run_off + wiped + missed + in_flight`,
+/// in whole nanolitres.
 #[derive(Serialize, Debug, Clone, Copy, PartialEq)]
 pub struct WaterReport {
     /// Sent out by emitters.
     pub emitted_mm3: f64,
     /// Was snow on a surface.
     pub melted_mm3: f64,
+    /// Brought by brushes.
+    pub painted_mm3: f64,
     /// Film and absorbed.
     pub on_surfaces_mm3: f64,
     /// Gone into the air.
     pub evaporated_mm3: f64,
     /// Dripped off and hit nothing more, or more than a texel can hold.
     pub run_off_mm3: f64,
+    /// Taken by brushes.
+    pub wiped_mm3: f64,
     /// Sent out and hit nothing.
     pub missed_mm3: f64,
     /// Still in flight.
@@ -131,6 +148,13 @@ pub struct Timing {
     pub frames: u32,
 }
 
+impl Report {
+    /// The expectations that were looked at and did not hold.
+    pub fn failed(&self) -> impl Iterator<Item = &ExpectationOutcome> {
+        self.expectations.iter().filter(|outcome| outcome.holds == Some(false))
+    }
+}
+
 /// Sums up a finished run.
 pub(super) fn report(
     world: &mut World,
@@ -153,12 +177,16 @@ pub(super) fn report(
                 absorbed_mm3: mm3(maps.stock.pores),
                 evaporated_mm3: mm3(maps.stock.evaporated),
                 dripped_mm3: mm3(maps.water.ledger().dripped),
+                painted_mm3: mm3(maps.water.ledger().painted),
+                wiped_mm3: mm3(maps.water.ledger().wiped),
                 wet_fraction: maps.wet_fraction,
                 dust_mm3: mm3(maps.matter.stock().dust),
                 mud_mm3: mm3(maps.matter.stock().mud),
                 snow_mm3: mm3(maps.matter.stock().snow),
                 washed_off_mm3: mm3(maps.matter.ledger().washed_off),
                 slid_off_mm3: mm3(maps.matter.ledger().slid_off),
+                wiped_soil_mm3: mm3(maps.matter.ledger().wiped),
+                wiped_snow_mm3: mm3(maps.matter.ledger().wiped_snow),
             };
             Some((surface.index, row))
         })
@@ -172,6 +200,7 @@ pub(super) fn report(
     let stats = world.resource::<WettingStats>();
     Report {
         scenario: options.scenario.file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        variant: options.scenario.variant.clone(),
         seed: world.resource::<EmissionSeed>().0,
         ticks: clock.tick(),
         seconds: clock.seconds(),
@@ -189,6 +218,7 @@ pub(super) fn report(
             tiles_spread: stats.tiles_spread(),
         },
         surfaces: surfaces.into_iter().map(|(_, row)| row).collect(),
+        expectations: world.resource::<Expectations>().outcomes().to_vec(),
         digest: amounts_digest(digest, maps.iter().map(|maps| (&maps.water, &maps.matter))),
         timing,
     }
@@ -215,9 +245,11 @@ fn water_report(world: &mut World, maps: &[SurfaceMaps]) -> WaterReport {
     let mut report = WaterReport {
         emitted_mm3: nl(counts.emitted_nl),
         melted_mm3: sum(&|maps| maps.matter.ledger().melted),
+        painted_mm3: sum(&|maps| maps.water.ledger().painted),
         on_surfaces_mm3: sum(&|maps| maps.stock.film + maps.stock.pores),
         evaporated_mm3: sum(&|maps| maps.stock.evaporated),
         run_off_mm3: nl(expired(true)) + sum(&|maps| maps.water.ledger().spilled),
+        wiped_mm3: sum(&|maps| maps.water.ledger().wiped),
         missed_mm3: nl(expired(false)),
         in_flight_mm3: nl(in_flight),
         imbalance: 0.0,
@@ -225,9 +257,10 @@ fn water_report(world: &mut World, maps: &[SurfaceMaps]) -> WaterReport {
     let found = report.on_surfaces_mm3
         + report.evaporated_mm3
         + report.run_off_mm3
+        + report.wiped_mm3
         + report.missed_mm3
         + report.in_flight_mm3;
-    let came = report.emitted_mm3 + report.melted_mm3;
+    let came = report.emitted_mm3 + report.melted_mm3 + report.painted_mm3;
     if came > 0.0 {
         report.imbalance = (came - found) / came;
     }

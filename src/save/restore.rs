@@ -15,7 +15,7 @@ use crate::overlay::{
     CpuMaps, Lying, Overlays, SurfaceFrames, SurfaceTotals, SurfaceTraces, Weatherable, mip_chain,
 };
 use crate::particle::Particles;
-use crate::scenario::{Digest, LoadedScenario, check_weather};
+use crate::scenario::{Digest, LoadedScenario, check_weather, rewind};
 use crate::weather::DryingClock;
 use crate::wetting::SurfaceWater;
 
@@ -83,6 +83,7 @@ impl SavedScene {
             return Err(value(&path, "effect of a particle", effect, format!("below {effects}")));
         }
 
+        rewind(world, state.tick);
         world.insert_resource(drying);
         world.insert_resource(state.weather);
         world.insert_resource(state.counts);

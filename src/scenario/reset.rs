@@ -3,6 +3,7 @@
 use bevy::prelude::*;
 
 use super::Digest;
+use super::timeline::rewind;
 use crate::clock::WeatheringClock;
 use crate::emitter::{Emitter, EmitterState, NewParticles};
 use crate::matter::{FallingSnow, MatterQueue, SurfaceMatter};
@@ -59,6 +60,7 @@ pub fn reset_scenario(world: &mut World) {
     world.insert_resource(WaterCounts::default());
     world.insert_resource(DryingClock::default());
     world.insert_resource(Digest::default());
+    rewind(world, 0);
     if let Some(mut splashes) = world.get_resource_mut::<Splashes>() {
         *splashes = Splashes::default();
     }

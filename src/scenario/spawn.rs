@@ -10,8 +10,9 @@ use bevy::prelude::*;
 use bevy::render::RenderApp;
 
 use super::content::Content;
-use super::motion::{EmitterMotion, ScenarioCamera, move_camera, move_emitters};
-use super::{Digest, LoadedScenario, MeshSpec, ScenarioError, digest};
+use super::motion::{ScenarioCamera, move_camera};
+use super::timeline::{MaterialHandles, apply_events_plugin, camera_keys, emitter_motion, insert_events};
+use super::{Digest, LoadedScenario, MeshSpec, ScenarioError};
 use crate::clock::ClockPlugin;
 use crate::collision::{BuildColliders, MeshColliders, NotWeatherable, SurfaceCollider};
 use crate::effect::{EffectTable, WeatherEffect};
@@ -19,7 +20,6 @@ use crate::emitter::{EmissionSeed, Emitter};
 use crate::material::{PlayedWetMap, Playing};
 use crate::overlay::{FramesWork, PrepareStamps, TexelArea};
 use crate::particle::{Forces, ParticleConfig};
-use crate::schedule::{WeatheringSystems, WeatheringTick};
 use crate::wetting::{self, ExposureProgress, MeasureSurfaces};
 
 /// Spawns a scenario and runs it once everything is loaded. Virtual time stands still until then.
@@ -49,7 +49,7 @@ struct CurrentScenario(LoadedScenario);
 
 /// What a scenario has spawned: it goes when another takes its place.
 #[derive(Component, Debug, Default, Clone, Copy)]
-pub struct ScenarioPart;
+pub struct SceneEntity;
 
 /// The folder that the app's asset server reads from, where it may be another than the scenario's tree: then files of the
 /// scenario are loaded by absolute paths, which the asset server must allow.
@@ -89,15 +89,8 @@ impl Plugin for ScenarioPlugin {
                     .after(MeasureSurfaces)
                     .after(PrepareStamps),
             )
-            .add_systems(
-                WeatheringTick,
-                (
-                    // Emitters stand where they should before they emit.
-                    move_emitters.in_set(WeatheringSystems::First),
-                    digest::digest_impacts.in_set(WeatheringSystems::Last),
-                ),
-            )
             .add_systems(Update, move_camera);
+        apply_events_plugin(app);
 
         let content = self.content.lock().ok().and_then(|mut content| content.take());
         let Some(content) = content else { return };
@@ -115,6 +108,7 @@ pub(super) fn set_up(world: &mut World, loaded: &LoadedScenario, seed: Option<u6
     world.insert_resource(scenario.weather());
     world.insert_resource(ParticleConfig { max_alive: scenario.max_particles });
     world.insert_resource(CurrentScenario(loaded.clone()));
+    insert_events(world, scenario);
     world.insert_resource(ScenarioStatus::Loading);
     world.resource_mut::<Time<Virtual>>().pause();
 }
@@ -135,7 +129,7 @@ pub(super) fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: C
         let handle = world.resource_mut::<Assets<WeatherEffect>>().add(effect.clone());
         world.resource_mut::<EffectTable>().insert(handle.clone(), effect);
         world.spawn((
-            ScenarioPart,
+            SceneEntity,
             Name::new(spec.name.clone()),
             Emitter {
                 effect: handle,
@@ -148,11 +142,7 @@ pub(super) fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: C
                 stream: index as u32,
                 enabled: false,
             },
-            EmitterMotion {
-                keys: spec.keys.clone(),
-                start: spec.start,
-                stop: spec.stop.unwrap_or(scenario.seconds),
-            },
+            emitter_motion(scenario, spec),
         ));
     }
     let mut materials = Vec::new();
@@ -178,7 +168,7 @@ pub(super) fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: C
         let transform = spec.transform();
         let surface = ScenarioSurface { index: index as u32, name: spec.name.clone() };
         let mut entity = world.spawn((
-            ScenarioPart,
+            SceneEntity,
             Name::new(spec.name.clone()),
             surface,
             spec.maps,
@@ -202,6 +192,8 @@ pub(super) fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: C
             entity.insert((MeshMaterial3d(material.clone()), textures.clone()));
         }
     }
+    let handles = materials.into_iter().map(|(_, material, textures)| (material, textures));
+    world.insert_resource(MaterialHandles(handles.collect()));
     if looks {
         spawn_view(world, loaded, content.environment);
     }
@@ -215,7 +207,7 @@ fn spawn_view(
     let scenario = &loaded.scenario;
     let [red, green, blue] = scenario.sun.color;
     world.spawn((
-        ScenarioPart,
+        SceneEntity,
         Name::new("sun"),
         DirectionalLight {
             illuminance: scenario.sun.illuminance,
@@ -228,13 +220,13 @@ fn spawn_view(
         Transform::default().looking_to(scenario.sun.direction, Vec3::Y),
     ));
     let mut camera = world.spawn((
-        ScenarioPart,
+        SceneEntity,
         Name::new("camera"),
         Camera3d::default(),
         Msaa::Sample4,
         Exposure { ev100: scenario.camera.ev100 },
         Projection::from(PerspectiveProjection { fov: scenario.camera.fov_deg.to_radians(), ..default() }),
-        ScenarioCamera { keys: scenario.camera.keys.clone() },
+        ScenarioCamera { keys: camera_keys(scenario) },
     ));
     let (Some(maps), Some(spec)) = (maps, &scenario.environment) else { return };
     let rotation = Quat::from_rotation_y(spec.turn_deg.to_radians());

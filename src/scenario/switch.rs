@@ -8,7 +8,7 @@ use bevy::prelude::*;
 
 use super::content::Content;
 use super::spawn::{set_up, spawn_scene};
-use super::{LoadedScenario, ScenarioError, ScenarioPart, reset_scenario};
+use super::{LoadedScenario, ScenarioError, SceneEntity, reset_scenario};
 use crate::clock::ShownTime;
 use crate::effect::EffectTable;
 use crate::wetting::DripEffect;
@@ -42,7 +42,7 @@ impl PreparedScenario {
 /// Entities that the user has spawned stay, surfaces and emitters among them; they are dry and begin anew.
 pub fn switch_scenario(world: &mut World, prepared: PreparedScenario) {
     reset_scenario(world);
-    let mut parts = world.query_filtered::<Entity, With<ScenarioPart>>();
+    let mut parts = world.query_filtered::<Entity, With<SceneEntity>>();
     for part in parts.iter(world).collect::<Vec<_>>() {
         // One may have gone with another that it was a child of.
         if let Ok(entity) = world.get_entity_mut(part) {

@@ -62,6 +62,7 @@ pub use geometry::{Link, Side, TexelGeometry};
 pub use marks::Marks;
 pub use points::{SurfacePoint, surface_points};
 pub use prepare::WetGeometry;
+pub(crate) use prepare::{ExchangeMatter, put_matter};
 pub use query::{BecameWet, Dried, SurfaceWetness, WatchWetness, Wetness, WetnessQuery};
 pub use soak::Drop;
 pub use surface::{Ledger, Stock, SurfaceWater};

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use bevy::ecs::system::SystemParam;
 use bevy::math::Mat3A;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
@@ -182,6 +183,52 @@ pub(super) fn settle_before_new_material(
         if former != *material && water.is_wet() {
             water.settle_all(&Now::new(clock.tick(), clock.hz(), &drying, &geometry.0, exposure, &former));
         }
+    }
+}
+
+type Exchanged = (
+    Entity,
+    &'static mut PorousMaterial,
+    Option<&'static mut FormerMaterial>,
+    Option<(&'static mut SurfaceWater, &'static WetGeometry, Option<&'static Exposure>)>,
+);
+
+/// Makes surfaces of other matter within a tick. What is exchanged between ticks is settled in the next frame, and so may
+/// depend on how ticks fall into frames; this does not.
+#[derive(SystemParam)]
+pub(crate) struct ExchangeMatter<'w, 's> {
+    clock: Res<'w, WeatheringClock>,
+    drying: Res<'w, DryingClock>,
+    commands: Commands<'w, 's>,
+    surfaces: Query<'w, 's, Exchanged>,
+}
+
+impl ExchangeMatter<'_, '_> {
+    /// The surface is of this matter from the start of the tick that is under way; until then it absorbed and dried as what
+    /// it was.
+    pub(crate) fn exchange(&mut self, surface: Entity, material: PorousMaterial) {
+        let Ok((entity, mut current, former, water)) = self.surfaces.get_mut(surface) else { return };
+        if let Some((mut water, geometry, exposure)) = water
+            && water.is_wet()
+        {
+            let before = self.clock.tick().saturating_sub(1);
+            let now = Now::new(before, self.clock.hz(), &self.drying, &geometry.0, exposure, &current);
+            water.settle_all(&now);
+        }
+        *current = material;
+        match former {
+            Some(mut former) => former.0 = material,
+            None => {
+                self.commands.entity(entity).insert(FormerMaterial(material));
+            }
+        }
+    }
+}
+
+/// Makes a surface of other matter without settling its water: it has been this matter all along.
+pub(crate) fn put_matter(world: &mut World, surface: Entity, material: PorousMaterial) {
+    if let Ok(mut entity) = world.get_entity_mut(surface) {
+        entity.insert((material, FormerMaterial(material)));
     }
 }
 

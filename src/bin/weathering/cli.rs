@@ -19,6 +19,10 @@ pub struct Cli {
 pub enum Command {
     /// Run a scenario without a window: pictures, maps, report.json
     Replay(ReplayArgs),
+    /// Check scenarios, their variants and the files they name, without running them
+    Check(CheckArgs),
+    /// Print the JSON Schema of scenario files
+    Schema,
     /// Open a scenario or a model in a window, to play with
     Sandbox(SandboxArgs),
     /// Make a wet map: what of a surface gets wet first
@@ -32,8 +36,11 @@ pub enum Command {
 
 #[derive(Args, Debug)]
 pub struct ReplayArgs {
-    /// The scenario
+    /// The scenario; exit code 1 if one of its expectations does not hold
     pub file: PathBuf,
+    /// One of its variants
+    #[arg(long)]
+    pub variant: Option<String>,
     /// Folder for frame_00000.png, ..., maps/ and report.json; without it the report goes to standard output
     #[arg(long)]
     pub out: Option<PathBuf>,
@@ -64,10 +71,23 @@ pub struct ReplayArgs {
 }
 
 #[derive(Args, Debug)]
+pub struct CheckArgs {
+    /// The scenarios
+    #[arg(required = true)]
+    pub files: Vec<PathBuf>,
+    /// Only with this of their variants [default: without, and with each of them]
+    #[arg(long)]
+    pub variant: Option<String>,
+}
+
+#[derive(Args, Debug)]
 pub struct SandboxArgs {
     /// A scenario (.ron), or a model by itself (.glb, .gltf)
     #[arg(default_value = "assets/scenarios/hose.ron")]
     pub file: PathBuf,
+    /// One of its variants
+    #[arg(long)]
+    pub variant: Option<String>,
     /// Folder for screenshots and saved scenes
     #[arg(long, default_value = "out")]
     pub out: PathBuf,

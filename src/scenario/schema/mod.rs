@@ -1,16 +1,22 @@
-//! What a scenario file may say. Every struct refuses fields it does not know.
+//! What a scenario file may say: a [`ScenarioPart`], which with all that it includes makes a [`Scenario`]. Every struct
+//! refuses fields it does not know.
 
 mod emitter;
+mod part;
 mod surface;
 
 use std::collections::BTreeMap;
 
 use bevy::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::EventSpec;
 use crate::weather::Weather;
 
 pub use emitter::{EmitterKey, EmitterSpec};
+pub(in crate::scenario) use part::replace;
+pub use part::{EmitterChange, ScenarioPart, WeatherPart};
 pub use surface::{MaterialSpec, MeshSpec, SurfaceSpec, SurfaceTextureSpec, TextureSpec, WetMapSpec};
 
 /// A scene and what happens in it. Lengths in metres, angles in degrees, time in seconds.
@@ -52,6 +58,9 @@ pub struct Scenario {
     /// What makes it wet, at most [`Self::MAX_EMITTERS`].
     #[serde(default)]
     pub emitters: Vec<EmitterSpec>,
+    /// What happens when, at most [`Self::MAX_EVENTS`]. In any order; of those at the same time the first comes first.
+    #[serde(default)]
+    pub events: Vec<EventSpec>,
 }
 
 impl Scenario {
@@ -63,10 +72,17 @@ impl Scenario {
     pub const MAX_SURFACES: usize = 10_000;
     /// The most emitters.
     pub const MAX_EMITTERS: usize = 4096;
+    /// The most events.
+    pub const MAX_EVENTS: usize = 10_000;
     /// The most particles an emitter sends per second.
     pub const MAX_RATE: f32 = 10_000_000.0;
     /// The most triangles of a generated mesh.
     pub const MAX_TRIANGLES: u64 = 20_000_000;
+}
+
+/// The JSON Schema of scenario files. RON's `Kind(field: 1)` is `{"Kind": {"field": 1}}` there, `(field: 1)` an object.
+pub fn schema_json() -> serde_json::Value {
+    schemars::schema_for!(ScenarioPart).into()
 }
 
 fn default_hz() -> u32 {
@@ -82,7 +98,7 @@ fn default_max_particles() -> u32 {
 }
 
 /// A camera that moves along its keys.
-#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct CameraSpec {
     /// Vertical field of view.
@@ -104,23 +120,26 @@ fn default_ev100() -> f32 {
 }
 
 /// Where the camera is at a time.
-#[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct CameraKey {
     /// Seconds.
     #[serde(default)]
     pub t: f32,
     /// Position of the eye.
+    #[schemars(with = "[f32; 3]")]
     pub eye: Vec3,
     /// What it looks at.
+    #[schemars(with = "[f32; 3]")]
     pub target: Vec3,
 }
 
 /// The sun.
-#[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct SunSpec {
     /// Where it shines to.
+    #[schemars(with = "[f32; 3]")]
     pub direction: Vec3,
     /// Lux.
     pub illuminance: f32,
@@ -172,7 +191,7 @@ impl Scenario {
 }
 
 /// A photograph of everything around.
-#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct EnvironmentSpec {
     /// Equirectangular `.exr`.

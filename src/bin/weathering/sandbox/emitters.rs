@@ -4,7 +4,7 @@ use bevy::prelude::*;
 use bevy_egui::egui;
 use bevy_weathering::emitter::{Emitter, EmitterShape, EmitterState, Flow};
 use bevy_weathering::particle::{ParticleConfig, ParticleCounts};
-use bevy_weathering::scenario::{ByHand, ScenarioPart};
+use bevy_weathering::scenario::{ByHand, SceneEntity};
 
 use super::effects;
 use super::hose::InHand;
@@ -48,7 +48,7 @@ fn show_emitter(ui: &mut egui::Ui, world: &mut World, entity: Entity) {
     let Some(before) = world.get::<Emitter>(entity).cloned() else { return };
     let mut emitter = before.clone();
     let mut by_hand = world.get::<ByHand>(entity).is_some();
-    let is_scripted = world.get::<ScenarioPart>(entity).is_some();
+    let is_scripted = world.get::<SceneEntity>(entity).is_some();
     if is_scripted {
         let about = "Its keys and working hours do not apply while it is in your hand";
         if ui.checkbox(&mut by_hand, "by hand").on_hover_text(about).changed() {

@@ -44,7 +44,7 @@ use bevy_weathering::scenario::{AssetTree, ScenarioPlugin};
 use crate::cli::SandboxArgs;
 
 pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
-    let loaded = open::load(&arguments.file)?;
+    let loaded = open::load(&arguments.file, arguments.variant.as_deref())?;
     require_adapter()?;
     if cfg!(target_os = "linux") && std::env::var_os("DISPLAY").is_none() {
         return Err("no display: DISPLAY is not set; use `weathering replay`, or start one (Xvfb)".into());

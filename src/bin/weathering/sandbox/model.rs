@@ -7,7 +7,7 @@ use bevy::gltf::GltfAssetLabel;
 use bevy::prelude::*;
 use bevy_weathering::overlay::Weatherable;
 use bevy_weathering::scenario::{
-    AssetTree, CameraKey, CameraSpec, LoadedScenario, Scenario, ScenarioPart, SunSpec, WeatherSpec,
+    AssetTree, CameraKey, CameraSpec, LoadedScenario, Scenario, SceneEntity, SunSpec, WeatherSpec,
 };
 use bevy_weathering::scenes::gltf_mesh::read_meshes;
 
@@ -61,8 +61,9 @@ pub fn bare_scenario(file: &Path) -> Result<LoadedScenario, String> {
         materials: BTreeMap::new(),
         surfaces: Vec::new(),
         emitters: Vec::new(),
+        events: Vec::new(),
     };
-    let loaded = LoadedScenario { scenario, file: file.into(), tree, hash: String::new() };
+    let loaded = LoadedScenario::made(scenario, file.into(), tree);
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     loaded.validate_gltf("model", &name).map_err(|error| error.to_string())?;
     Ok(loaded)
@@ -84,7 +85,7 @@ pub fn spawn(world: &mut World, loaded: &LoadedScenario) {
         _ => absolute,
     };
     let scene = world.resource::<AssetServer>().load(GltfAssetLabel::Scene(0).from_asset(path));
-    world.spawn((ScenarioPart, Model, Name::new("model"), WorldAssetRoot(scene), Transform::default()));
+    world.spawn((SceneEntity, Model, Name::new("model"), WorldAssetRoot(scene), Transform::default()));
 }
 
 /// Meshes of models that have texture coordinates get wet, as soon as they are there.

@@ -42,11 +42,14 @@ pub fn plugin(app: &mut App) {
 }
 
 /// Reads a scenario, or what stands for one around a model.
-pub fn load(file: &Path) -> Result<LoadedScenario, String> {
+///
+/// # Errors
+/// What is wrong, with the file.
+pub fn load(file: &Path, variant: Option<&str>) -> Result<LoadedScenario, String> {
     if model::is_model(file) {
         model::bare_scenario(file)
     } else {
-        Scenario::load(file).map_err(|error| error.to_string())
+        Scenario::load_variant(file, variant).map_err(|error| error.to_string())
     }
 }
 
@@ -54,7 +57,7 @@ pub fn load(file: &Path) -> Result<LoadedScenario, String> {
 pub fn open(world: &mut World, file: &Path) {
     let path = file.to_owned();
     let task = AsyncComputeTaskPool::get().spawn(async move {
-        let loaded = load(&path)?;
+        let loaded = load(&path, None)?;
         PreparedScenario::new(loaded, true).map_err(|error| error.to_string())
     });
     world.resource_mut::<Opening>().0 = Some((file.to_owned(), task));
@@ -121,10 +124,10 @@ mod tests {
     #[test]
     fn what_cannot_be_opened_is_named() {
         for file in ["none/such.ron", "none/such.glb"] {
-            let error = load(Path::new(file)).unwrap_err();
+            let error = load(Path::new(file), None).unwrap_err();
             assert!(error.contains("such"), "{error}");
         }
         let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/scenarios/hose.ron");
-        assert!(!load(&scenario).unwrap().scenario.surfaces.is_empty());
+        assert!(!load(&scenario, None).unwrap().scenario.surfaces.is_empty());
     }
 }

@@ -17,7 +17,7 @@ use bevy_weathering::emitter::Emitter;
 use bevy_weathering::material::{DryMaterial, PorousMaterial, StandingWater, WettingTextures};
 use bevy_weathering::overlay::Weatherable;
 use bevy_weathering::particle::ParticleMesh;
-use bevy_weathering::scenario::ScenarioPart;
+use bevy_weathering::scenario::SceneEntity;
 
 use super::camera::View;
 use super::theme;
@@ -120,7 +120,7 @@ fn copy_surfaces(world: &mut World, offset: Vec3) {
         let name = of.get::<Name>().map_or_else(|| original.to_string(), ToString::to_string);
         let copy = (
             CopyOf(original),
-            ScenarioPart,
+            SceneEntity,
             Name::new(format!("B: {name}")),
             *surface,
             mesh.clone(),
@@ -149,7 +149,7 @@ fn add_camera(world: &mut World) {
     let layers = RenderLayers::layer(LAYERS[1]);
     let mut second = world.spawn((
         SecondCamera,
-        ScenarioPart,
+        SceneEntity,
         Name::new("second camera"),
         Camera3d::default(),
         camera,
@@ -181,13 +181,7 @@ fn follow_emitters(
         let mut transform = global.compute_transform();
         transform.translation += split.offset;
         let emitter = Emitter { stream: emitter.stream.wrapping_add(STREAMS), ..emitter.clone() };
-        commands.spawn((
-            CopyOf(original),
-            ScenarioPart,
-            emitter,
-            transform,
-            GlobalTransform::from(transform),
-        ));
+        commands.spawn((CopyOf(original), SceneEntity, emitter, transform, GlobalTransform::from(transform)));
     }
     for (copy, of, mut emitter, mut transform, mut global) in &mut copies {
         let Ok((_, original, place)) = originals.get(of.0) else {
