@@ -155,7 +155,7 @@ impl Run<'_> {
 }
 
 /// Rows of RGBA texels without what aligns them to 256 bytes on the way.
-fn without_padding(bytes: &[u8], size: u32) -> Vec<u8> {
+pub fn without_padding(bytes: &[u8], size: u32) -> Vec<u8> {
     let row = size as usize * 4;
     let padded = bytes.len() / size as usize;
     bytes.chunks(padded.max(row)).flat_map(|padded| &padded[..row]).copied().collect()

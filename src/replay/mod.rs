@@ -27,7 +27,7 @@ use crate::scenario::{LoadedScenario, ScenarioError, ScenarioPlugin, ScenarioSta
 pub use app::{require_adapter, task_pools};
 pub use capture::write_png;
 pub use files::write_atomic;
-pub use maps::SurfaceMaps;
+pub use maps::{SurfaceMaps, without_padding};
 pub use report::{ParticleReport, Report, SurfaceReport, Timing, WaterReport, WorkReport};
 
 /// What to run and what to write.

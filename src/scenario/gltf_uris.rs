@@ -8,8 +8,12 @@ use super::{LoadedScenario, ScenarioError};
 use crate::scenes::gltf_mesh::{data_uri, percent_decoded};
 
 impl LoadedScenario {
-    /// Checks that a glTF and every buffer and image it refers to exist inside the tree.
-    pub(super) fn validate_gltf(&self, field: &str, value: &str) -> Result<(), ScenarioError> {
+    /// Checks that a glTF and every buffer and image it refers to exist inside the tree. `value` is its path there, `field`
+    /// what messages call it.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] for what is missing, outside the tree, or no glTF.
+    pub fn validate_gltf(&self, field: &str, value: &str) -> Result<(), ScenarioError> {
         let file = self.resolve(field, value)?;
         let bytes = std::fs::read(&file).map_err(|error| self.content_error(field, value, error))?;
         let json = match json_chunk(&bytes) {

@@ -22,6 +22,7 @@ mod motion;
 mod reset;
 mod schema;
 mod spawn;
+mod switch;
 mod timeline;
 mod validate;
 
@@ -29,7 +30,7 @@ pub use content::SurfaceMesh;
 pub use digest::{Digest, amounts_digest};
 pub use error::ScenarioError;
 pub use load::LoadedScenario;
-pub use motion::ScenarioCamera;
+pub use motion::{ByHand, ScenarioCamera};
 pub use reset::reset_scenario;
 pub use schema::schema_json;
 pub use schema::{
@@ -37,7 +38,8 @@ pub use schema::{
     Scenario, ScenarioPart, SunSpec, SurfaceSpec, SurfaceTextureSpec, TextureSpec, WeatherPart, WeatherSpec,
     WetMapSpec,
 };
-pub use spawn::{ScenarioPlugin, ScenarioStatus, ScenarioSurface};
+pub use spawn::{AssetTree, ScenarioPlugin, ScenarioStatus, ScenarioSurface, SceneEntity};
+pub use switch::{PreparedScenario, switch_scenario};
 pub use timeline::{
     Action, BrushEvent, CameraMove, EmitterMove, EventSpec, Expectation, ExpectationOutcome, Expectations,
     MaterialChange, Quantity, WeatherChange,

@@ -36,6 +36,7 @@ mod ownership;
 mod points;
 mod posed;
 mod prepare;
+mod put_back;
 pub(crate) mod query;
 mod rim;
 mod run_off;

@@ -23,7 +23,7 @@ pub enum Command {
     Check(CheckArgs),
     /// Print the JSON Schema of scenario files
     Schema,
-    /// Open a scenario in a window
+    /// Open a scenario or a model in a window, to play with
     Sandbox(SandboxArgs),
     /// Make a wet map: what of a surface gets wet first
     #[command(subcommand)]
@@ -82,13 +82,13 @@ pub struct CheckArgs {
 
 #[derive(Args, Debug)]
 pub struct SandboxArgs {
-    /// The scenario
+    /// A scenario (.ron), or a model by itself (.glb, .gltf)
     #[arg(default_value = "assets/scenarios/hose.ron")]
     pub file: PathBuf,
     /// One of its variants
     #[arg(long)]
     pub variant: Option<String>,
-    /// Folder for screenshots
+    /// Folder for screenshots and saved scenes
     #[arg(long, default_value = "out")]
     pub out: PathBuf,
 }
