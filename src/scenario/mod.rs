@@ -11,6 +11,7 @@
 mod content;
 mod digest;
 mod error;
+mod files;
 mod gltf_uris;
 mod load;
 mod motion;

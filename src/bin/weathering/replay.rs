@@ -1,16 +1,28 @@
 //! `weathering replay`.
 
 use std::error::Error;
+use std::path::Path;
 
 use bevy::log::tracing_subscriber;
 use bevy_weathering::replay::{ReplayOptions, replay};
 use bevy_weathering::scenario::Scenario;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::batch;
 use crate::cli::ReplayArgs;
 
 pub fn run(arguments: &ReplayArgs) -> Result<(), Box<dyn Error>> {
     tracing_subscriber::fmt().with_max_level(bevy::log::Level::WARN).with_writer(std::io::stderr).init();
+    match arguments.files.as_slice() {
+        [file] if !arguments.is_batch() => run_one(file, arguments),
+        _ => batch::run(arguments),
+    }
+}
+
+fn run_one(file: &Path, arguments: &ReplayArgs) -> Result<(), Box<dyn Error>> {
+    if arguments.end_with_input {
+        batch::end_with_input();
+    }
     let options = ReplayOptions {
         out: arguments.out.clone(),
         fps: arguments.fps,
@@ -21,7 +33,10 @@ pub fn run(arguments: &ReplayArgs) -> Result<(), Box<dyn Error>> {
         render: !arguments.no_render,
         resume: arguments.resume.clone(),
         save: arguments.save_state.clone(),
-        ..ReplayOptions::new(Scenario::load(&arguments.file)?)
+        every: arguments.every,
+        video: arguments.video,
+        sheet: arguments.sheet,
+        ..ReplayOptions::new(Scenario::load(file)?)
     };
     let bar = ProgressBar::no_length().with_style(
         ProgressStyle::with_template("{bar:40} tick {pos}/{len}, {elapsed} gone, {eta} to go")
