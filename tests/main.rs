@@ -40,6 +40,8 @@ mod gpu {
 mod layout;
 /// Dust, mud and snow.
 mod matter;
+/// What a replay makes of its numbers and pictures, and many replays at once.
+mod outputs;
 /// Skinned meshes in their pose.
 mod posed;
 /// The program as its users run it: output, errors, exit codes.

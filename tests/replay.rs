@@ -12,8 +12,8 @@ use tempfile::TempDir;
 const HOSE: &str = "assets/scenarios/hose.ron";
 const VASE: &str = "assets/scenarios/vase.ron";
 
-/// A tap over a square metre of ground: what [`Tree`] holds, and what its copies spoil.
-const TAP: &str = r#"(
+/// A tap over a square metre of ground: what [`Tree`] holds, what its copies spoil, and what is run many times.
+pub const TAP: &str = r#"(
     seconds: 1.0,
     max_particles: 1000,
     camera: (keys: [(eye: (0.0, 1.0, 2.0), target: (0.0, 0.0, 0.0))]),
@@ -134,7 +134,10 @@ fn expected_files(surfaces: &[&str], frames: u32) -> BTreeSet<String> {
     let maps = ["diffuse", "specular", "normal", "film", "absorbed", "wetness", "since"];
     let maps = surfaces.iter().flat_map(|name| maps.map(|map| format!("maps/{name}_{map}.png")));
     let frames = (0..frames).map(|frame| format!("frame_{frame:05}.png"));
-    maps.chain(frames).chain(["report.json".into()]).collect()
+    let plots = ["wetness", "film", "absorbed", "water", "particles", "timings"];
+    let plots = plots.map(|plot| format!("plots/{plot}.svg"));
+    let tables = ["report.json", "series.csv", "timings.csv"].map(String::from);
+    maps.chain(frames).chain(plots).chain(tables).collect()
 }
 
 /// A 16-bit map.

@@ -8,10 +8,11 @@ use crate::clock::WeatheringClock;
 use crate::collision::ColliderReport;
 use crate::effect::EffectTable;
 use crate::emitter::{EmissionSeed, NewParticles};
+use crate::matter::SurfaceMatter;
 use crate::overlay::SurfaceTotals;
 use crate::particle::{Particle, ParticleCounts, Particles, WaterCounts};
 use crate::scenario::{Digest, ExpectationOutcome, Expectations, ScenarioSurface, amounts_digest};
-use crate::wetting::{DripEffect, WettingStats};
+use crate::wetting::{DripEffect, Stock, SurfaceWater, WettingStats};
 
 /// `report.json`.
 #[derive(Serialize, Debug, Clone)]
@@ -192,7 +193,8 @@ pub(super) fn report(
         })
         .collect();
     surfaces.sort_by_key(|(index, _)| *index);
-    let water = water_report(world, maps);
+    let accounts: Vec<_> = maps.iter().map(SurfaceMaps::accounts).collect();
+    let water = water_report(world, &accounts);
 
     let clock = *world.resource::<WeatheringClock>();
     let counts = *world.resource::<ParticleCounts>();
@@ -224,10 +226,24 @@ pub(super) fn report(
     }
 }
 
+/// The accounts of a surface.
+pub(super) struct SurfaceAccounts<'a> {
+    pub(super) water: &'a SurfaceWater,
+    /// Where that water is now.
+    pub(super) stock: Stock,
+    pub(super) matter: &'a SurfaceMatter,
+}
+
+impl SurfaceMaps {
+    fn accounts(&self) -> SurfaceAccounts<'_> {
+        SurfaceAccounts { water: &self.water, stock: self.stock, matter: &self.matter }
+    }
+}
+
 /// Adds up all water, wherever it is.
-fn water_report(world: &mut World, maps: &[SurfaceMaps]) -> WaterReport {
+pub(super) fn water_report(world: &World, maps: &[SurfaceAccounts]) -> WaterReport {
     let nl = |nl: u64| nl as f64 / 1000.0;
-    let sum = |of: &dyn Fn(&SurfaceMaps) -> u64| -> f64 {
+    let sum = |of: &dyn Fn(&SurfaceAccounts) -> u64| -> f64 {
         maps.iter().map(|maps| maps.water.units().mm3(of(maps))).sum::<f64>() + 0.0
     };
     let effects = world.resource::<EffectTable>();
