@@ -36,6 +36,8 @@ mod gpu {
 mod layout;
 /// Dust, mud and snow.
 mod matter;
+/// One budget for the maps of all surfaces.
+mod pool;
 /// The program as its users run it: output, errors, exit codes.
 mod replay;
 /// Scenes that are saved and gone on with, and accounts of all water.

@@ -26,8 +26,8 @@ pub use load::LoadedScenario;
 pub use motion::ScenarioCamera;
 pub use reset::reset_scenario;
 pub use schema::{
-    CameraKey, CameraSpec, EmitterKey, EmitterSpec, EnvironmentSpec, MaterialSpec, MeshSpec, Scenario,
-    SunSpec, SurfaceSpec, SurfaceTextureSpec, TextureSpec, WeatherSpec, WetMapSpec,
+    CameraKey, CameraSpec, EmitterKey, EmitterSpec, EnvironmentSpec, MapBudgetSpec, MaterialSpec, MeshSpec,
+    Scenario, SunSpec, SurfaceSpec, SurfaceTextureSpec, TextureSpec, WeatherSpec, WetMapSpec,
 };
 pub use spawn::{ScenarioPlugin, ScenarioStatus, ScenarioSurface};
 pub(crate) use validate::check_weather;

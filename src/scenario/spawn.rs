@@ -15,7 +15,7 @@ use crate::collision::{BuildColliders, MeshColliders, NotWeatherable, SurfaceCol
 use crate::effect::{EffectTable, WeatherEffect};
 use crate::emitter::{EmissionSeed, Emitter};
 use crate::material::{PlayedWetMap, Playing};
-use crate::overlay::{FramesWork, PrepareStamps, TexelArea};
+use crate::overlay::{FramesWork, PrepareStamps, TexelArea, Unmapped};
 use crate::particle::{Forces, ParticleConfig};
 use crate::schedule::{WeatheringSystems, WeatheringTick};
 use crate::wetting::{self, ExposureProgress, MeasureSurfaces};
@@ -94,6 +94,9 @@ impl Plugin for ScenarioPlugin {
                 ),
             )
             .add_systems(Update, move_camera);
+        if let Some(budget) = scenario.map_budget() {
+            app.insert_resource(budget);
+        }
         app.world_mut().resource_mut::<Time<Virtual>>().pause();
 
         let content = self.content.lock().ok().and_then(|mut content| content.take());
@@ -239,6 +242,8 @@ fn watch_loading(
         (),
         (
             With<ScenarioSurface>,
+            // Refused for want of room, which the log tells.
+            Without<Unmapped>,
             Or<(Without<SurfaceCollider>, Without<TexelArea>, Without<wetting::Exposure>)>,
         ),
     >,

@@ -94,6 +94,7 @@ impl Plugin for WettingPlugin {
             .add_message::<BecameWet>()
             .add_message::<Dried>()
             .add_observer(prepare::release_surface)
+            .add_observer(prepare::release_maps)
             .add_systems(
                 PreUpdate,
                 (prepare::settle_before_new_material, prepare::measure_surfaces, exposure::bake_exposure)

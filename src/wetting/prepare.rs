@@ -11,7 +11,7 @@ use crate::clock::WeatheringClock;
 use crate::collision::{MeshBvh, SurfaceCollider};
 use crate::material::PorousMaterial;
 use crate::matter::{FallingSnow, MatterQueue, SurfaceMatter};
-use crate::overlay::{TexelArea, Weatherable, Wrap};
+use crate::overlay::{MapSize, TexelArea, Weatherable, Wrap};
 use crate::weather::DryingClock;
 
 /// The shape of a surface's texels, and which lie beside each other. Comes some frames after its collider.
@@ -41,20 +41,18 @@ impl Measured {
         Some(geometry)
     }
 
-    fn is_of(&self, surface: &Weatherable, collider: &SurfaceCollider, transform: &GlobalTransform) -> bool {
+    fn is_of(&self, map: (u32, [Wrap; 2]), collider: &SurfaceCollider, transform: &GlobalTransform) -> bool {
         let matrix = transform.affine().matrix3;
         let scale = self.matrix.determinant().abs().cbrt().max(1e-12);
         // A degree or two of turning changes nothing worth measuring again.
         let turned = (0..3).any(|axis| (self.matrix.col(axis) - matrix.col(axis)).length() > 0.03 * scale);
-        !turned
-            && (self.size, self.wrap) == (surface.texels(), surface.wrap())
-            && Arc::ptr_eq(&self.bvh, &collider.0)
+        !turned && (self.size, self.wrap) == map && Arc::ptr_eq(&self.bvh, &collider.0)
     }
 }
 
 type Measurable = (
     Entity,
-    Ref<'static, Weatherable>,
+    (Ref<'static, Weatherable>, Ref<'static, MapSize>),
     Ref<'static, SurfaceCollider>,
     &'static TexelArea,
     Ref<'static, GlobalTransform>,
@@ -73,21 +71,24 @@ pub(super) fn measure_surfaces(
     drying: Res<DryingClock>,
     mut surfaces: Query<Measurable>,
 ) {
-    for (entity, surface, collider, texel, transform, mut measured, mut water, past) in &mut surfaces {
-        let changed = surface.is_changed() || collider.is_changed() || transform.is_changed();
+    for (entity, (surface, map), collider, texel, transform, mut measured, mut water, past) in &mut surfaces {
+        let changed =
+            surface.is_changed() || map.is_changed() || collider.is_changed() || transform.is_changed();
+        let (size, wrap) = (map.texels(), surface.wrap());
         // What is being measured is finished first: a surface that keeps turning is measured as fast as that goes.
         let stale = match &measured {
             None => true,
             Some(measured) if measured.task.is_some() => false,
-            Some(measured) => (changed || measured.late) && !measured.is_of(&surface, &collider, &transform),
+            Some(measured) => {
+                (changed || measured.late) && !measured.is_of((size, wrap), &collider, &transform)
+            }
         };
-        let (size, wrap) = (surface.texels(), surface.wrap());
         if stale {
             if let Some(water) = &mut water
                 && (water.size, water.wrap) != (size, wrap)
             {
                 // What was on the old maps is gone with them.
-                **water = SurfaceWater::new(&surface, texel.mean_mm2);
+                **water = SurfaceWater::of_size(size, wrap, texel.mean_mm2);
                 commands.entity(entity).remove::<(WetGeometry, Exposure)>();
             }
             let (affine, bvh) = (transform.affine(), collider.0.clone());
@@ -129,7 +130,7 @@ pub(super) fn measure_surfaces(
             entity.remove::<Exposure>();
         }
         if water.is_none() {
-            entity.insert(SurfaceWater::new(&surface, texel.mean_mm2));
+            entity.insert(SurfaceWater::of_size(size, wrap, texel.mean_mm2));
         }
     }
 }
@@ -164,6 +165,11 @@ pub(super) fn settle_before_new_material(
             water.settle_all(&Now::new(clock.tick(), clock.hz(), &drying, &geometry.0, exposure, &former));
         }
     }
+}
+
+/// A surface without maps has no water any more. What is queued for it, and what is falling off it, stays.
+pub(super) fn release_maps(removed: On<Remove, MapSize>, mut commands: Commands) {
+    commands.entity(removed.entity).try_remove::<(WetGeometry, Measured, SurfaceWater, Exposure)>();
 }
 
 /// A surface that is not [`Weatherable`] any more is not wet any more.
