@@ -35,7 +35,7 @@ pub mod prelude {
     pub use crate::effect::WeatherEffect;
     pub use crate::emitter::{Emitter, EmitterShape, Flow};
     pub use crate::material::{PorousMaterial, StandingWater, WettingModel};
-    pub use crate::overlay::{OverlayUv, Weatherable, Wrap};
+    pub use crate::overlay::{MapBudget, OverlayUv, Weatherable, Wrap};
     pub use crate::particle::Forces;
     pub use crate::schedule::{WeatheringSystems, WeatheringTick};
     pub use crate::weather::Weather;

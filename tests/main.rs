@@ -42,6 +42,8 @@ mod layout;
 mod matter;
 /// What a replay makes of its numbers and pictures, and many replays at once.
 mod outputs;
+/// One budget for the maps of all surfaces.
+mod pool;
 /// Skinned meshes in their pose.
 mod posed;
 /// The program as its users run it: output, errors, exit codes.

@@ -43,7 +43,18 @@ fn the_series_ends_with_what_the_report_says() {
         assert_eq!(last[&format!("particles_{name}")], number(&report["particles"][name]), "{name}");
     }
     let is_close = |ml: f64, mm3: f64| (ml * 1000.0 - mm3).abs() <= 1.0e-9 * mm3.abs();
-    for name in ["emitted", "melted", "on_surfaces", "evaporated", "run_off", "missed", "in_flight"] {
+    for name in [
+        "emitted",
+        "melted",
+        "painted",
+        "on_surfaces",
+        "evaporated",
+        "run_off",
+        "wiped",
+        "missed",
+        "in_flight",
+        "evicted",
+    ] {
         let (ml, mm3) = (last[&format!("{name}_ml")], number(&report["water"][format!("{name}_mm3")]));
         assert!(is_close(ml, mm3), "{name}: {ml} ml, {mm3} mm³");
     }

@@ -35,7 +35,6 @@ use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 
 use crate::clock::WeatheringClock;
-use crate::overlay::SurfaceTotals;
 use crate::picture::PictureError;
 use crate::save::{ColorMaps, SaveError, SavedScene};
 use crate::scenario::{LoadedScenario, ScenarioError, ScenarioPlugin, ScenarioStatus, captures};
@@ -380,8 +379,7 @@ impl<'a> Run<'a> {
     /// Puts a saved scene in place of the fresh one.
     fn resume(&mut self, saved: &SavedScene, folder: &Path) -> Result<(), ReplayError> {
         saved.restore(self.app.world_mut(), &self.options.scenario, folder)?;
-        let world = self.app.world_mut();
-        self.painted_before = world.query::<&SurfaceTotals>().iter(world).map(|totals| totals.impacts).sum();
+        self.painted_before = maps::to_be_painted(self.app.world_mut());
         for _ in 0..3 {
             self.step(0)?;
         }

@@ -44,6 +44,7 @@ fn plots(scenario: &str, SeriesTables { rows, timings }: &SeriesTables) -> [Opti
         ("run off", "run_off_ml"),
         ("missed", "missed_ml"),
         ("in flight", "in_flight_ml"),
+        ("wiped", "wiped_ml"),
     ];
     let mut particles = named(rows, &[("in flight", "particles_alive")], Table::column);
     particles.extend(named(

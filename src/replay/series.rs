@@ -17,7 +17,7 @@ use super::{ReplayError, ReplayOptions, Run, write_atomic};
 use crate::clock::WeatheringClock;
 use crate::material::PorousMaterial;
 use crate::matter::SurfaceMatter;
-use crate::overlay::SurfaceTotals;
+use crate::overlay::{MapLoss, SurfaceTotals};
 use crate::particle::ParticleCounts;
 use crate::scenario::{Scenario, ScenarioSurface};
 use crate::schedule::WeatheringTick;
@@ -30,7 +30,7 @@ pub(super) const SERIES_FILE: &str = "series.csv";
 pub(super) const TIMINGS_FILE: &str = "timings.csv";
 
 /// The columns that every scenario has. Amounts of water since the start and where they are now, ml; see [`WaterReport`].
-const TOTALS: [&str; 14] = [
+const TOTALS: [&str; 17] = [
     "tick",
     "seconds",
     "particles_alive",
@@ -40,11 +40,14 @@ const TOTALS: [&str; 14] = [
     "particles_refused",
     "emitted_ml",
     "melted_ml",
+    "painted_ml",
     "on_surfaces_ml",
     "evaporated_ml",
     "run_off_ml",
+    "wiped_ml",
     "missed_ml",
     "in_flight_ml",
+    "evicted_ml",
 ];
 
 /// The columns of each surface, behind its name and a dot. `film_mm` and `absorbed_mm` are means over its area; `received_ml`,
@@ -191,7 +194,7 @@ fn take_row(world: &mut World) {
 
 type Surface = (
     (&'static ScenarioSurface, &'static SurfaceTotals, &'static SurfaceWater, &'static WetGeometry),
-    (Option<&'static Exposure>, Option<&'static PorousMaterial>, &'static SurfaceMatter),
+    (Option<&'static Exposure>, Option<&'static PorousMaterial>, &'static SurfaceMatter, &'static MapLoss),
 );
 
 /// The numbers of this moment.
@@ -202,10 +205,10 @@ fn row(world: &mut World, time: [f64; 2]) -> Vec<f64> {
     let drying = world.resource::<DryingClock>();
     let default = PorousMaterial::default();
     let mut surfaces = Vec::new();
-    for ((surface, totals, water, geometry), (exposure, material, matter)) in query.iter(world) {
+    for ((surface, totals, water, geometry), (exposure, material, matter, loss)) in query.iter(world) {
         let material = material.unwrap_or(&default);
         let now = Now::new(clock.tick(), clock.hz(), drying, &geometry.0, exposure, material);
-        let accounts = SurfaceAccounts { water, stock: water.stock(&now), matter };
+        let accounts = SurfaceAccounts { water, stock: water.stock(&now), matter, loss };
         // Not asked of those that never got any water, since it looks at every texel.
         let over = if water.is_wet() { summary(water, &now) } else { SurfaceWetness::default() };
         surfaces.push((surface.index as usize, of_surface(&accounts, totals, &over), accounts));
@@ -230,15 +233,18 @@ fn of_particles(counts: &ParticleCounts) -> [f64; 5] {
     [alive, emitted, hit, expired, refused].map(|count| count as f64)
 }
 
-fn of_water(water: &WaterReport) -> [f64; 7] {
+fn of_water(water: &WaterReport) -> [f64; 10] {
     [
         water.emitted_mm3,
         water.melted_mm3,
+        water.painted_mm3,
         water.on_surfaces_mm3,
         water.evaporated_mm3,
         water.run_off_mm3,
+        water.wiped_mm3,
         water.missed_mm3,
         water.in_flight_mm3,
+        water.evicted_mm3,
     ]
     .map(|mm3| mm3 / 1000.0)
 }
@@ -297,10 +303,10 @@ mod tests {
     #[test]
     fn every_column_has_its_name() {
         let columns = columns(&options(1.0, 60, None).scenario.scenario);
-        assert_eq!(columns.len(), 26);
+        assert_eq!(columns.len(), 29);
         let of_time = 2;
-        assert_eq!(TOTALS.len(), of_time + of_particles(&ParticleCounts::default()).len() + 7);
-        assert_eq!((columns[0].as_str(), columns[14].as_str()), ("tick", "ground.wet_fraction"));
+        assert_eq!(TOTALS.len(), of_time + of_particles(&ParticleCounts::default()).len() + 10);
+        assert_eq!((columns[0].as_str(), columns[17].as_str()), ("tick", "ground.wet_fraction"));
     }
 
     #[test]
@@ -326,6 +332,6 @@ mod tests {
         crowd.scenario.scenario.surfaces = vec![surface; 10_000];
         let every = f64::from(crowd.series_ticks().unwrap());
         let rows = f64::from(day) * 60.0 / every;
-        assert!(every % 60.0 == 0.0 && (rows + 1.0) * 120_014.0 <= MAX_CELLS as f64, "{every}");
+        assert!(every % 60.0 == 0.0 && (rows + 1.0) * 120_017.0 <= MAX_CELLS as f64, "{every}");
     }
 }

@@ -35,9 +35,9 @@ pub use motion::{ByHand, ScenarioCamera};
 pub use reset::reset_scenario;
 pub use schema::schema_json;
 pub use schema::{
-    CameraKey, CameraSpec, EmitterChange, EmitterKey, EmitterSpec, EnvironmentSpec, MaterialSpec, MeshSpec,
-    Scenario, ScenarioPart, SunSpec, SurfaceSpec, SurfaceTextureSpec, TextureSpec, WeatherPart, WeatherSpec,
-    WetMapSpec,
+    CameraKey, CameraSpec, EmitterChange, EmitterKey, EmitterSpec, EnvironmentSpec, MapBudgetSpec,
+    MaterialSpec, MeshSpec, Scenario, ScenarioPart, SunSpec, SurfaceSpec, SurfaceTextureSpec, TextureSpec,
+    WeatherPart, WeatherSpec, WetMapSpec,
 };
 pub use spawn::{AssetTree, ScenarioPlugin, ScenarioStatus, ScenarioSurface, SceneEntity};
 pub use switch::{PreparedScenario, switch_scenario};

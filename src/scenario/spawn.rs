@@ -18,7 +18,7 @@ use crate::collision::{BuildColliders, MeshColliders, NotWeatherable, SurfaceCol
 use crate::effect::{EffectTable, WeatherEffect};
 use crate::emitter::{EmissionSeed, Emitter};
 use crate::material::{PlayedWetMap, Playing};
-use crate::overlay::{FramesWork, OverlayUv, PrepareStamps, TexelArea, Weatherable};
+use crate::overlay::{FramesWork, OverlayUv, PrepareStamps, TexelArea, Unmapped, Weatherable};
 use crate::particle::{Forces, ParticleConfig};
 use crate::unwrap::NotUnwrapped;
 use crate::wetting::{self, ExposureProgress, MeasureSurfaces};
@@ -91,6 +91,9 @@ impl Plugin for ScenarioPlugin {
                     .after(PrepareStamps),
             )
             .add_systems(Update, move_camera);
+        if let Some(budget) = scenario.map_budget() {
+            app.insert_resource(budget);
+        }
         apply_events_plugin(app);
 
         let content = self.content.lock().ok().and_then(|mut content| content.take());
@@ -269,6 +272,8 @@ fn watch_loading(
         (),
         (
             With<ScenarioSurface>,
+            // Refused for want of room, which the log tells.
+            Without<Unmapped>,
             Or<(Without<SurfaceCollider>, Without<TexelArea>, Without<wetting::Exposure>)>,
         ),
     >,

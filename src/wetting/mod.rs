@@ -103,6 +103,7 @@ impl Plugin for WettingPlugin {
             .add_message::<BecameWet>()
             .add_message::<Dried>()
             .add_observer(prepare::release_surface)
+            .add_observer(prepare::release_maps)
             .add_systems(
                 PreUpdate,
                 (
