@@ -3,8 +3,8 @@
 use bevy::asset::uuid::Uuid;
 use bevy::prelude::*;
 use bevy_weathering::overlay::{
-    CpuMaps, MapBudget, MapLoss, MapNeed, MapPool, MapSize, SplatQueue, StampSpace, SurfaceEvicted,
-    SurfaceTotals, Unmapped,
+    CpuMaps, MapBudget, MapLoss, MapNeed, MapPool, MapSize, OverlayUv, SplatQueue, StampSpace,
+    SurfaceEvicted, SurfaceTotals, Unmapped,
 };
 use bevy_weathering::prelude::*;
 use bevy_weathering::scenes::meshes::ground;
@@ -35,7 +35,13 @@ fn add(scene: &mut Scene, side: f32) -> Mesh3d {
 }
 
 fn spawn(scene: &mut Scene, mesh: Mesh3d, map_size: u32, at: Vec3) -> Entity {
-    let maps = Weatherable { map_size, wrap_u: Wrap::Clamp, wrap_v: Wrap::Clamp, stamps: StampSpace::Map };
+    let maps = Weatherable {
+        map_size,
+        wrap_u: Wrap::Clamp,
+        wrap_v: Wrap::Clamp,
+        stamps: StampSpace::Map,
+        uv: OverlayUv::Mesh,
+    };
     let transform = Transform::from_translation(at);
     scene.0.world_mut().spawn((maps, mesh, transform, GlobalTransform::from(transform))).id()
 }

@@ -264,7 +264,7 @@ pub(super) fn water_report(world: &World, maps: &[SurfaceAccounts]) -> WaterRepo
         maps.iter().map(|maps| maps.water.units().mm3(of(maps))).sum::<f64>() + 0.0
     };
     let lost = |of: &dyn Fn(&MapLoss) -> u64| -> f64 {
-        maps.iter().map(|maps| MapLoss::mm3(of(&maps.loss))).sum::<f64>() + 0.0
+        maps.iter().map(|maps| MapLoss::mm3(of(maps.loss))).sum::<f64>() + 0.0
     };
     let effects = world.resource::<EffectTable>();
     let waiting = world.resource::<NewParticles>().waiting().iter().copied();

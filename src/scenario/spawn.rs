@@ -91,9 +91,6 @@ impl Plugin for ScenarioPlugin {
                     .after(PrepareStamps),
             )
             .add_systems(Update, move_camera);
-        if let Some(budget) = scenario.map_budget() {
-            app.insert_resource(budget);
-        }
         apply_events_plugin(app);
 
         let content = self.content.lock().ok().and_then(|mut content| content.take());
@@ -112,6 +109,7 @@ pub(super) fn set_up(world: &mut World, loaded: &LoadedScenario, seed: Option<u6
     world.insert_resource(scenario.weather());
     world.insert_resource(ParticleConfig { max_alive: scenario.max_particles });
     world.insert_resource(CurrentScenario(loaded.clone()));
+    world.insert_resource(scenario.map_budget().unwrap_or_default());
     insert_events(world, scenario);
     world.insert_resource(ScenarioStatus::Loading);
     world.resource_mut::<Time<Virtual>>().pause();

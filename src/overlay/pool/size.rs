@@ -74,7 +74,7 @@ struct Room {
     /// Bytes; below 0 if more are taken than there are.
     free: i128,
     /// Who was hit longest ago comes first.
-    candidates: std::vec::IntoIter<Mapped>,
+    candidates: vec::IntoIter<Mapped>,
 }
 
 impl Room {

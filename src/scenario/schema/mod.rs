@@ -195,7 +195,7 @@ impl Scenario {
 }
 
 /// What the maps of all surfaces may take; see [`MapBudget`].
-#[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct MapBudgetSpec {
     /// MiB on the GPU, above 0 up to [`Self::MAX_MIB`].

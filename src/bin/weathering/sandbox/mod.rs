@@ -100,6 +100,7 @@ fn scene_panels(app: &mut App) {
         probe::plugin,
         maps::plugin,
         plots::plugin,
+        split::plugin,
     ));
 }
 

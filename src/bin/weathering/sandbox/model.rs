@@ -54,6 +54,7 @@ pub fn bare_scenario(file: &Path) -> Result<LoadedScenario, String> {
         gravity: Vec3::new(0.0, -9.81, 0.0),
         wind: Vec3::ZERO,
         weather: WeatherSpec::default(),
+        map_budget: None,
         max_particles: 1_000_000,
         camera: CameraSpec { fov_deg: 40.0, ev100: 12.0, keys: vec![CameraKey { t: 0.0, eye, target }] },
         sun: SunSpec::default(),
