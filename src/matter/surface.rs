@@ -98,8 +98,8 @@ impl MatterTiles {
     /// Takes tiles whose flag has been cleared out of the lists.
     pub(crate) fn prune(&mut self) {
         let Self { flags, sliding, melting } = self;
-        sliding.retain(|&tile| flags[tile as usize] & Self::SNOW_MOVES != 0);
-        melting.retain(|&tile| flags[tile as usize] & Self::MELTS != 0);
+        Tiles::prune(sliding, flags, Self::SNOW_MOVES);
+        Tiles::prune(melting, flags, Self::MELTS);
     }
 }
 

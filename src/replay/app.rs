@@ -77,6 +77,7 @@ pub(super) fn build(options: &ReplayOptions, scenario: ScenarioPlugin) -> App {
                 .disable::<PanicHandlerPlugin>()
                 .disable::<TerminalCtrlCHandlerPlugin>(),
         )
+        .insert_resource(options.splat_budget)
         .add_plugins(WeatheringPlugins);
     } else {
         app.add_plugins(MinimalPlugins.set(tasks))

@@ -35,6 +35,7 @@ use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 
 use crate::clock::WeatheringClock;
+use crate::overlay::SplatBudget;
 use crate::picture::PictureError;
 use crate::save::{ColorMaps, SaveError, SavedScene};
 use crate::scenario::{LoadedScenario, ScenarioError, ScenarioPlugin, ScenarioStatus, captures};
@@ -77,6 +78,8 @@ pub struct ReplayOptions {
     pub video: bool,
     /// Make a contact sheet of so many pictures, up to [`Self::MAX_SHEET`]. Needs `out` and `render`.
     pub sheet: Option<u32>,
+    /// What may be painted in a frame. All, since nobody waits for it; less gives the same maps, in more frames.
+    pub splat_budget: SplatBudget,
 }
 
 impl ReplayOptions {
@@ -101,6 +104,7 @@ impl ReplayOptions {
             every: None,
             video: false,
             sheet: None,
+            splat_budget: SplatBudget::UNLIMITED,
         }
     }
 }

@@ -75,7 +75,7 @@ pub(crate) use run_off::{RunScratch, run_off};
 pub(crate) use soak::note_arrival;
 #[cfg(test)]
 pub(crate) use soak::{SoakScratch, soak};
-pub(crate) use surface::{Now, jitter, texel_in};
+pub(crate) use surface::{Now, Tiles, jitter, texel_in};
 
 /// Drips of this tick, of one surface.
 #[derive(Component, Debug, Default)]

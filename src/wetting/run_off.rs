@@ -123,7 +123,7 @@ pub(crate) fn run_off(
     }
     if !due.is_empty() {
         let Tiles { running, flags, .. } = &mut water.tiles;
-        running.retain(|&tile| flags[tile as usize] & Tiles::RUNNING != 0);
+        Tiles::prune(running, flags, Tiles::RUNNING);
     }
     let count = due.len() as u32;
     scratch.tiles = due;

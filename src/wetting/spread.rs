@@ -64,7 +64,7 @@ pub(crate) fn spread(water: &mut SurfaceWater, now: &Now, scratch: &mut SpreadSc
         water.tiles.touch(tile);
     }
     let Tiles { spreading, flags, .. } = &mut water.tiles;
-    spreading.retain(|&tile| flags[tile as usize] & Tiles::SPREADING != 0);
+    Tiles::prune(spreading, flags, Tiles::SPREADING);
     tiles.len() as u32
 }
 

@@ -103,6 +103,14 @@ impl Tiles {
         self.flags[tile as usize] |= Self::RENEWED;
     }
 
+    /// Takes those out of a list whose flag is gone. A tile that came to rest and was woken again in the same tick is there twice,
+    /// and stays once.
+    pub(crate) fn prune(list: &mut Vec<u32>, flags: &[u8], flag: u8) {
+        list.retain(|&tile| flags[tile as usize] & flag != 0);
+        list.sort_unstable();
+        list.dedup();
+    }
+
     pub(crate) fn has(&self, tile: u32, flag: u8) -> bool {
         self.flags[tile as usize] & flag != 0
     }
@@ -454,6 +462,17 @@ pub struct Stock {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_tile_that_is_woken_in_the_tick_of_its_rest_is_busy_once() {
+        let mut tiles = Tiles { flags: vec![0; 4], ..default() };
+        [3, 1, 2].into_iter().for_each(|tile| tiles.run(tile));
+        tiles.flags[1] &= !Tiles::RUNNING;
+        tiles.flags[3] &= !Tiles::RUNNING;
+        tiles.run(1);
+        Tiles::prune(&mut tiles.running, &tiles.flags, Tiles::RUNNING);
+        assert_eq!(tiles.running, [1, 2]);
+    }
 
     #[test]
     fn what_changes_by_less_than_a_byte_a_time_changes_in_the_long_run() {
