@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::texel::{MatterKind, TexelMatter, pour, take};
 use crate::overlay::TILE_SIZE;
+use crate::wetting::Tiles;
 
 /// Dust, mud and snow on a surface. Beside [`SurfaceWater`](crate::wetting::SurfaceWater), whose units and tiles it shares;
 /// empty until the first of it comes.
