@@ -72,26 +72,10 @@ impl Run<'_> {
         {
             let material = material.unwrap_or(&default);
             let now = Now::new(clock.tick(), clock.hz(), &drying, &geometry.0, exposure, material);
-            let wetness = (0..maps.texels().pow(2)).map(|texel| wetness_of(water, &now, texel)).collect();
-            let mut read = SurfaceMaps {
-                name: surface.name.clone(),
-                size: maps.texels(),
-                diffuse: vec![],
-                specular: vec![],
-                normal: vec![],
-                wetness,
-                since: water.texels().iter().map(|texel| texel.tick).collect(),
-                wet_fraction: f64::from(summary(water, &now).wet_fraction),
-                water: water.clone(),
-                stock: water.stock(&now),
-                matter: matter.clone(),
-                hz: clock.hz(),
-            };
-            if let Some(cpu) = cpu {
-                read.diffuse = cpu.diffuse.as_flattened().to_vec();
-                read.specular = cpu.specular.as_flattened().to_vec();
-                read.normal = cpu.normal.as_flattened().to_vec();
-            } else if let Some(gpu) = gpu {
+            let read = SurfaceMaps::new(surface.name.clone(), maps, water, matter, cpu, &now);
+            if cpu.is_none()
+                && let Some(gpu) = gpu
+            {
                 requests.push((entity, 0, Readback::texture(gpu.diffuse.clone())));
                 requests.push((entity, 1, Readback::texture(gpu.specular.clone())));
                 requests.push((entity, 2, Readback::texture(gpu.normal.clone())));
@@ -154,6 +138,36 @@ impl Run<'_> {
     }
 }
 
+impl SurfaceMaps {
+    /// Of a surface as it is now; without colour maps unless they are on the CPU.
+    pub(crate) fn new(
+        name: String,
+        maps: &Weatherable,
+        water: &SurfaceWater,
+        matter: &SurfaceMatter,
+        cpu: Option<&CpuMaps>,
+        now: &Now,
+    ) -> Self {
+        let colors = |of: fn(&CpuMaps) -> &Vec<[u8; 4]>| {
+            cpu.map(|cpu| of(cpu).as_flattened().to_vec()).unwrap_or_default()
+        };
+        Self {
+            name,
+            size: maps.texels(),
+            diffuse: colors(|cpu| &cpu.diffuse),
+            specular: colors(|cpu| &cpu.specular),
+            normal: colors(|cpu| &cpu.normal),
+            wetness: (0..maps.texels().pow(2)).map(|texel| wetness_of(water, now, texel)).collect(),
+            since: water.texels().iter().map(|texel| texel.tick).collect(),
+            wet_fraction: f64::from(summary(water, now).wet_fraction),
+            water: water.clone(),
+            stock: water.stock(now),
+            matter: matter.clone(),
+            hz: now.hz,
+        }
+    }
+}
+
 /// Rows of RGBA texels without what aligns them to 256 bytes on the way.
 fn without_padding(bytes: &[u8], size: u32) -> Vec<u8> {
     let row = size as usize * 4;
@@ -168,7 +182,7 @@ pub(super) const MAP_NAMES: [&str; 7] =
 /// Writes `<surface>_<map>.png` for each map: `diffuse`, `specular`, `normal` as they are; `film` and `absorbed` as 16-bit
 /// micrometres of water, `wetness` as 16-bit parts of full, `since` as 16-bit hundredths of a second of the reference
 /// time (0 is never). Values too large stop at 65,535.
-pub(super) fn write_maps(folder: &Path, surfaces: &[SurfaceMaps]) -> Result<(), ReplayError> {
+pub(crate) fn write_maps(folder: &Path, surfaces: &[SurfaceMaps]) -> Result<(), ReplayError> {
     for surface in surfaces {
         let path = |map| folder.join(format!("{}_{map}.png", surface.name));
         let [diffuse, specular, normal, film, absorbed, wetness, since] = MAP_NAMES.map(path);

@@ -24,10 +24,13 @@ use crate::picture::PictureError;
 use crate::save::{ColorMaps, SaveError, SavedScene};
 use crate::scenario::{LoadedScenario, ScenarioError, ScenarioPlugin, ScenarioStatus};
 
+pub(crate) use app::headless;
 pub use app::{require_adapter, task_pools};
 pub use capture::write_png;
 pub use files::write_atomic;
 pub use maps::SurfaceMaps;
+pub(crate) use maps::write_maps;
+pub(crate) use report::water_of;
 pub use report::{ParticleReport, Report, SurfaceReport, Timing, WaterReport, WorkReport};
 
 /// What to run and what to write.

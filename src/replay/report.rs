@@ -233,3 +233,8 @@ fn water_report(world: &mut World, maps: &[SurfaceMaps]) -> WaterReport {
     }
     report
 }
+
+/// The water of a world whose surfaces are all among `maps`.
+pub(crate) fn water_of(world: &mut World, maps: &[SurfaceMaps]) -> WaterReport {
+    water_report(world, maps)
+}

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::bake::BakeArgs;
 use crate::stamps::StampsArgs;
 use crate::wetmap::WetMapCommand;
 use bevy::math::UVec2;
@@ -21,6 +22,8 @@ pub enum Command {
     Replay(ReplayArgs),
     /// Open a scenario in a window
     Sandbox(SandboxArgs),
+    /// Let it rain on a glTF scene, and bake what that leaves into its textures
+    Bake(BakeArgs),
     /// Make a wet map: what of a surface gets wet first
     #[command(subcommand)]
     Wetmap(WetMapCommand),

@@ -1,5 +1,6 @@
-//! `weathering`: replays scenarios to pictures and numbers, and opens them to play with.
+//! `weathering`: replays scenarios to pictures and numbers, opens them to play with, and bakes scenes.
 
+mod bake;
 mod cli;
 mod replay;
 mod sandbox;
@@ -16,6 +17,7 @@ fn main() -> ExitCode {
         cli::Command::Replay(arguments) => replay::run(&arguments),
         cli::Command::Sandbox(arguments) => sandbox::run(&arguments),
         cli::Command::Wetmap(command) => wetmap::run(&command),
+        cli::Command::Bake(arguments) => bake::run(&arguments),
         cli::Command::Stamps(arguments) => stamps::run(&arguments),
         cli::Command::WetTexture(arguments) => wet_texture::run(&arguments),
     };
