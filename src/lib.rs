@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod bake;
+pub mod brush;
 pub mod clock;
 pub mod collision;
 pub mod effect;
@@ -29,12 +30,13 @@ use bevy::prelude::*;
 /// What a Bevy app needs to get things wet.
 pub mod prelude {
     pub use crate::WeatheringPlugins;
+    pub use crate::brush::{Brush, BrushKind, BrushQueue};
     pub use crate::clock::WeatheringClock;
     pub use crate::collision::{ReportImpacts, SurfaceImpact};
     pub use crate::effect::WeatherEffect;
     pub use crate::emitter::{Emitter, EmitterShape, Flow};
     pub use crate::material::{PorousMaterial, StandingWater, WettingModel};
-    pub use crate::overlay::{OverlayUv, Weatherable, Wrap};
+    pub use crate::overlay::{MapBudget, OverlayUv, Weatherable, Wrap};
     pub use crate::particle::Forces;
     pub use crate::schedule::{WeatheringSystems, WeatheringTick};
     pub use crate::weather::Weather;
@@ -56,6 +58,7 @@ pub mod prelude {
 /// | [`DepositPlugin`](overlay::DepositPlugin) | turns impacts into splats | no |
 /// | [`MatterPlugin`](matter::MatterPlugin) | gives surfaces room for dust, mud and snow | no |
 /// | [`WettingPlugin`](wetting::WettingPlugin) | absorbs, moves and dries water | no |
+/// | [`BrushPlugin`](brush::BrushPlugin) | wets, dries, dirties and cleans by hand | no |
 /// | [`GpuOverlayPlugin`](overlay::GpuOverlayPlugin) | paints splats into maps | yes |
 /// | [`WaterUploadPlugin`](wetting::gpu::WaterUploadPlugin) | sends water to be drawn | yes |
 /// | [`ParticleDrawPlugin`](particle::ParticleDrawPlugin) | draws particles in flight | yes |
@@ -79,6 +82,7 @@ impl PluginGroup for WeatheringPlugins {
             .add(overlay::DepositPlugin)
             .add(matter::MatterPlugin)
             .add(wetting::WettingPlugin)
+            .add(brush::BrushPlugin)
             .add(overlay::GpuOverlayPlugin)
             .add(wetting::gpu::WaterUploadPlugin)
             .add(particle::ParticleDrawPlugin)

@@ -25,7 +25,7 @@ pub struct WeatheringTick;
 /// The stages of one weathering tick, in the order they run.
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum WeatheringSystems {
-    /// Empty, for systems that want to run before the tick.
+    /// Brushes paint and events of scenarios act; for systems that want to run before the tick.
     First,
     /// Emitters spawn particles.
     Emit,
@@ -37,7 +37,7 @@ pub enum WeatheringSystems {
     Deposit,
     /// Water is absorbed, runs, spreads and drips.
     Flow,
-    /// Empty, for systems that want to see the finished tick.
+    /// For systems that want to see the finished tick.
     Last,
 }
 

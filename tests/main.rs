@@ -47,6 +47,10 @@ mod gpu {
 mod layout;
 /// Dust, mud and snow.
 mod matter;
+/// What a replay makes of its numbers and pictures, and many replays at once.
+mod outputs;
+/// One budget for the maps of all surfaces.
+mod pool;
 /// Skinned meshes in their pose.
 mod posed;
 /// The program as its users run it: output, errors, exit codes.
@@ -57,6 +61,8 @@ mod save;
 mod schedule;
 /// Marks across the borders of uv islands.
 mod seams;
+/// Events of scenarios, includes, variants, checks.
+mod timeline;
 /// The smaller tools of the program.
 mod tools;
 /// Meshes whose texture coordinates lie on each other.

@@ -44,14 +44,19 @@ pub(super) fn measure_clearance(mut scene: ResMut<CollisionScene>, mut work: Loc
     }
 }
 
-/// Cells along the longest side of the box.
-const CELLS: f32 = 96.0;
+/// The most cells, at a byte each: so many that the grid still fits a cache of the second level.
+const MOST_CELLS: f32 = 100_000.0;
+
+/// The most cells along the longest side of the box.
+const MOST_ALONG: f32 = 512.0;
 
 /// Distances to the nearest surface, cell by cell.
 #[derive(Debug, Clone)]
 pub(super) struct Clearance {
     low: Vec3,
     cell: f32,
+    /// 1 / `cell`.
+    cells_per_metre: f32,
     size: UVec3,
     /// Steps to the nearest cell that holds a part of a triangle, diagonal ones too; x runs fastest.
     steps: Vec<u8>,
@@ -61,13 +66,14 @@ impl Clearance {
     /// Of triangles in world space that lie in the box.
     pub(super) fn new((low, high): (Vec3, Vec3), triangles: impl Iterator<Item = [Vec3; 3]>) -> Option<Self> {
         let extent = high - low;
-        let cell = extent.max_element() / CELLS;
+        let finest = extent.max_element() / MOST_ALONG;
+        let cell = (extent.max(Vec3::splat(finest)).element_product() / MOST_CELLS).cbrt().max(finest);
         if !(extent.is_finite() && cell > 0.0) {
             return None;
         }
         let size = (extent / cell).ceil().as_uvec3().max(UVec3::ONE);
         let count = size.element_product() as usize;
-        let mut grid = Self { low, cell, size, steps: vec![u8::MAX; count] };
+        let mut grid = Self { low, cell, cells_per_metre: cell.recip(), size, steps: vec![u8::MAX; count] };
         triangles.for_each(|triangle| grid.mark(triangle));
         grid.measure();
         Some(grid)
@@ -134,7 +140,7 @@ impl Clearance {
     /// Whether a segment hits nothing for certain. One that begins outside the box may hit something.
     #[inline]
     pub(super) fn is_clear(&self, start: Vec3, end: Vec3) -> bool {
-        let at = (start - self.low) / self.cell;
+        let at = (start - self.low) * self.cells_per_metre;
         if !(at.cmpge(Vec3::ZERO).all() && at.cmplt(self.size.as_vec3()).all()) {
             return false;
         }

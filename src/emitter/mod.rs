@@ -9,6 +9,7 @@ mod emit;
 mod shape;
 
 use bevy::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::WeatherEffect;
@@ -61,7 +62,7 @@ impl Default for Emitter {
 }
 
 /// How much an emitter sends out.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Default)]
 pub enum Flow {
     /// Each particle what its effect says.
     #[default]
@@ -100,7 +101,7 @@ pub fn nozzle_speed(litres_per_minute: f32, radius: f32) -> f32 {
 }
 
 /// Where on an emitter particles start. Lengths in metres, in the emitter's space; forward is -Z.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Default)]
 pub enum EmitterShape {
     /// All from the origin.
     #[default]
@@ -119,12 +120,14 @@ pub enum EmitterShape {
     /// Anywhere in a box.
     Box {
         /// Half its size per axis.
+        #[schemars(with = "[f32; 3]")]
         half_size: Vec3,
     },
     /// A horizontal rectangle in world space, whatever the emitter's rotation, from which particles start
     /// downwards (leaning with [`Emitter::spread`]): rain and snow.
     Sky {
         /// Half its size along world X and Z.
+        #[schemars(with = "[f32; 2]")]
         half_size: Vec2,
     },
 }

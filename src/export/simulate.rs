@@ -19,7 +19,9 @@ use crate::emitter::{EmissionSeed, Emitter, EmitterShape, Flow};
 use crate::material::PorousMaterial;
 use crate::matter::snow::RELATIVE_DENSITY;
 use crate::matter::{SurfaceMatter, TexelMatter};
-use crate::overlay::{CpuMaps, FramesWork, OverlayUv, SurfaceTotals, TexelArea, Weatherable};
+use crate::overlay::{
+    CpuMaps, FramesWork, MapBudget, MapLoss, OverlayUv, SurfaceTotals, TexelArea, Weatherable,
+};
 use crate::particle::{Lifespan, ParticleCounts};
 use crate::replay::{Progress, SurfaceMaps, WaterReport, headless, task_pools, water_of};
 use crate::weather::DryingClock;
@@ -77,6 +79,8 @@ pub(super) fn simulate(
     let mut app = headless(task_pools(options.threads), assets);
     ClockPlugin { hz: options.tick_hz }.insert_clock(&mut app);
     app.insert_resource(EmissionSeed(options.seed)).insert_resource(options.weather);
+    // Nothing goes to a GPU, and how many texels there may be has been looked at.
+    app.insert_resource(MapBudget { bytes: 1 << 50, texel: None });
     // A frame may be as long as it likes.
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::from_secs(86_400));
     app.finish();
@@ -108,7 +112,7 @@ pub(super) fn simulate(
         progress(Progress { tick, ticks });
     }
     let (surfaces, maps): (Vec<_>, Vec<_>) = read(app.world_mut()).into_iter().unzip();
-    let water = water_of(app.world_mut(), &maps);
+    let water = water_of(app.world(), &maps);
     let particles = *app.world().resource::<ParticleCounts>();
     Ok(Outcome { surfaces, maps, water, particles, ticks })
 }
@@ -204,21 +208,28 @@ fn read(world: &mut World) -> Vec<(Soaked, SurfaceMaps)> {
     let clock = *world.resource::<WeatheringClock>();
     let drying = world.resource::<DryingClock>().clone();
     let mut query = world.query::<(
-        (&Number, &Name, &Weatherable, &PorousMaterial, &ColliderReport, &SurfaceTotals),
+        (&Number, &Name, &Weatherable, &PorousMaterial, &ColliderReport, &SurfaceTotals, &MapLoss),
         (&SurfaceWater, &SurfaceMatter, &WetGeometry, Option<&Exposure>, Option<&CpuMaps>),
     )>();
     let mut surfaces: Vec<_> = query
         .iter(world)
         .map(
-            |((number, name, maps, material, collider, totals), (water, matter, geometry, exposure, cpu))| {
+            |(
+                (number, name, maps, material, collider, totals, loss),
+                (water, matter, geometry, exposure, cpu),
+            )| {
+                let size = maps.texels();
                 let now = Now::new(clock.tick(), clock.hz(), &drying, &geometry.0, exposure, material);
                 let soaked = Soaked {
                     area_m2: geometry.0.area_mm2().iter().copied().map(f64::from).sum::<f64>() / 1e6,
                     triangles: collider.0.total,
                     totals: *totals,
-                    held: held(water, matter, cpu, &now, maps.texels()),
+                    held: held(water, matter, cpu, &now, size),
                 };
-                (number.0, (soaked, SurfaceMaps::new(name.to_string(), maps, water, matter, cpu, &now)))
+                (
+                    number.0,
+                    (soaked, SurfaceMaps::new(name.to_string(), size, water, matter, *loss, cpu, &now)),
+                )
             },
         )
         .collect();

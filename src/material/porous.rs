@@ -1,13 +1,14 @@
 //! How a surface takes up water and looks with it.
 
 use bevy::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::wetting::evolve::Matter;
 
 /// How a surface takes up water and looks with it. On an entity with [`Weatherable`](crate::overlay::Weatherable);
 /// without it, the default is used. May be changed at any time.
-#[derive(Component, Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[derive(Component, Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component)]
 #[serde(deny_unknown_fields, default)]
 pub struct PorousMaterial {
@@ -86,7 +87,7 @@ impl PorousMaterial {
 }
 
 /// A way to look wet. One per material, so that darkenings never stack by accident.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
 pub enum WettingModel {
     /// Filled pores give back no diffuse light and mirror instead; see [`hnat`](super::models::hnat). A film on top
     /// reflects, but does not darken.
@@ -121,7 +122,7 @@ impl WettingModel {
 }
 
 /// Parameters of the porous BRDF.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct Pores {
     /// α_poro, the part of the surface that is pores; 0 (glazed) to 1.
@@ -147,7 +148,7 @@ impl Default for Pores {
 }
 
 /// Parameters of a film over rough matter.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct Coated {
     /// Part of the surface that is rough matter and takes the film, 0 (glazed) to 1.
@@ -163,7 +164,7 @@ impl Default for Coated {
 }
 
 /// Parameters of matter made of grains.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct Grains {
     /// Part of the surface that is grains, 0 (glazed) to 1.
@@ -179,7 +180,7 @@ impl Default for Grains {
 }
 
 /// Parameters of the tweak of albedo and gloss.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct Tweaked {
     /// 0 (glazed) to 1; what `source` says multiplies it.
@@ -197,7 +198,7 @@ impl Default for Tweaked {
 }
 
 /// Where the porosity of a texel comes from.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PorositySource {
     /// The same everywhere.
     #[default]
@@ -211,7 +212,7 @@ pub enum PorositySource {
 }
 
 /// A second set of parameters, for wetness 1.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct WetLook {
     /// Linear RGB; multiplies [`WettingTextures::wet_color`] or, without it, the dry colour.
@@ -229,7 +230,7 @@ impl Default for WetLook {
 }
 
 /// What a base colour texture is a picture of.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum TextureMeaning {
     /// The porous surface, dry: a photograph. Wetness multiplies by `kd_w / kd'`.
     #[default]
@@ -239,7 +240,7 @@ pub enum TextureMeaning {
 }
 
 /// The BRDF under the post-process.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum BaseBrdf {
     /// Bevy's own: GGX and Burley's diffuse.
     #[default]

@@ -1,11 +1,12 @@
 //! Water that stands on a surface without having fallen there.
 
 use bevy::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Standing water and what rain that is not simulated does to it. Optional, on an entity with
 /// [`Weatherable`](crate::overlay::Weatherable); what particles bring comes on top.
-#[derive(Component, Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[derive(Component, Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component)]
 #[serde(deny_unknown_fields, default)]
 pub struct StandingWater {
@@ -36,7 +37,7 @@ impl Default for StandingWater {
 /// A law that says where water stands. Height is the green channel of
 /// [`WettingTextures::surface`](super::WettingTextures::surface), paint that of the vertex colours; both are 1 where
 /// they are missing. On a surface with a flood, vertex colours are not seen as colours.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Default)]
 pub enum Flood {
     /// Nowhere.
     #[default]

@@ -37,7 +37,7 @@ pub use surface::{MatterLedger, MatterStock, SurfaceMatter};
 pub use texel::{MatterKind, TexelMatter};
 
 pub(crate) use advance::{MatterScratch, advance_matter, is_at_rest};
-pub(crate) use settle::deposit;
+pub(crate) use settle::{deposit, put, wake};
 pub(crate) use surface::MatterTiles;
 pub(crate) use wash::bind_dried;
 

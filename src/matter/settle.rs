@@ -81,7 +81,8 @@ pub(crate) fn wake(water: &mut SurfaceWater, matter: &mut SurfaceMatter, now: &N
     matter.wake(water.size);
 }
 
-fn put(
+/// Puts matter, in nanolitres, on one texel that has room for it.
+pub(crate) fn put(
     water: &mut SurfaceWater,
     matter: &mut SurfaceMatter,
     now: &Now,

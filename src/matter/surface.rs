@@ -23,8 +23,8 @@ pub struct SurfaceMatter {
 
 /// What has become of the matter of a surface; units.
 ///
-/// `received_dust + received_mud` is the dust and mud on it, and `washed_off`; `received_snow` is the snow on it, `melted`
-/// and `slid_off`. To the unit.
+/// `received_dust + received_mud` is the dust and mud on it, `washed_off` and `wiped`; `received_snow` is the snow on it,
+/// `melted`, `slid_off` and `wiped_snow`. To the unit.
 #[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MatterLedger {
     /// Came as dust.
@@ -39,6 +39,12 @@ pub struct MatterLedger {
     pub melted: u64,
     /// Snow that left over an edge, or found no room.
     pub slid_off: u64,
+    /// Dust and mud that a [brush](crate::brush) took away.
+    #[serde(default)]
+    pub wiped: u64,
+    /// Snow that a brush took away.
+    #[serde(default)]
+    pub wiped_snow: u64,
 }
 
 /// Matter on a surface at a moment; units.
@@ -225,6 +231,20 @@ impl SurfaceMatter {
         let gone = take(&mut self.texels[texel as usize].snow, units);
         self.ledger.slid_off += u64::from(gone);
         gone
+    }
+
+    /// A brush takes a part of what lies on a texel away, 0..=1; how much it was.
+    pub(crate) fn wipe(&mut self, texel: u32, part: f64) -> u64 {
+        let Some(here) = self.texels.get_mut(texel as usize) else { return 0 };
+        // The conversion saturates, and takes NaN for 0; `take` takes no more than there is.
+        let share = |amount: u32| (f64::from(amount) * part).round() as u64;
+        let [dust, mud, snow] = [&mut here.dust, &mut here.mud, &mut here.snow].map(|amount| {
+            let units = share(*amount);
+            u64::from(take(amount, units))
+        });
+        self.ledger.wiped += dust + mud;
+        self.ledger.wiped_snow += snow;
+        dust + mud + snow
     }
 
     /// Snow becomes water, which the caller puts there.

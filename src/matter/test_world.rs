@@ -165,6 +165,8 @@ impl Ground {
 pub(super) fn assert_balanced(matter: &SurfaceMatter) {
     let (stock, ledger) = (matter.stock(), matter.ledger());
     let soil = ledger.received_dust + ledger.received_mud;
-    assert_eq!(soil, stock.dust + stock.mud + ledger.washed_off, "{stock:?} {ledger:?}");
-    assert_eq!(ledger.received_snow, stock.snow + ledger.melted + ledger.slid_off, "{stock:?} {ledger:?}");
+    let gone = ledger.washed_off + ledger.wiped;
+    assert_eq!(soil, stock.dust + stock.mud + gone, "{stock:?} {ledger:?}");
+    let gone = ledger.melted + ledger.slid_off + ledger.wiped_snow;
+    assert_eq!(ledger.received_snow, stock.snow + gone, "{stock:?} {ledger:?}");
 }

@@ -12,6 +12,9 @@
 //! # Wraparound
 //! A stamp over the edge of the map continues at the opposite edge ([`Wrap::Repeat`]) or ends there
 //! ([`Wrap::Clamp`]).
+//!
+//! # How large maps are
+//! All maps share a [`MapBudget`]. A surface has none until that gives it a [`MapSize`] (`pool`).
 
 mod atlas;
 mod cpu;
@@ -21,12 +24,14 @@ mod gpu;
 pub mod kernel;
 mod maps;
 mod mips;
+mod pool;
 mod site;
 mod splat;
 mod stamping;
 mod tiles;
 
 use bevy::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use atlas::StampAtlas;
@@ -39,6 +44,7 @@ pub use gpu::{GpuOverlayPlugin, MipStep, Overlays, SplatStats, SurfaceBatch};
 pub(crate) use maps::Footprint;
 pub use maps::{RainRing, TexelArea, TexelAreas};
 pub use mips::{Lying, mip_chain, mip_levels};
+pub use pool::{MapBudget, MapLoss, MapNeed, MapPool, MapSize, SizeMaps, SurfaceEvicted, Unmapped};
 pub use splat::Splat;
 pub use tiles::{TILE_SIZE, TileBins, TileHeader};
 
@@ -46,11 +52,12 @@ pub use tiles::{TILE_SIZE, TileBins, TileHeader};
 ///
 /// Needs a mesh with texture coordinates, or one that can be unwrapped ([`OverlayUv`]). Where a `StandardMaterial` is on the
 /// entity, it is exchanged for its weathered form with the same settings.
-#[derive(Component, Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Component, Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq)]
 #[reflect(Component)]
 #[serde(deny_unknown_fields, default)]
 pub struct Weatherable {
-    /// Texels along each side of the maps; a multiple of [`TILE_SIZE`] from 16 to [`Self::MAX_MAP_SIZE`].
+    /// The most texels along each side of the maps; a multiple of [`TILE_SIZE`] from 16 to [`Self::MAX_MAP_SIZE`]. As many
+    /// as there are, unless [`MapBudget`] makes do with fewer: see [`MapSize`].
     pub map_size: u32,
     /// What happens at the left and right edge of the maps.
     pub wrap_u: Wrap,
@@ -68,7 +75,7 @@ pub struct Weatherable {
 /// A mesh that gets unique ones is shown as a copy that has them as `UV_1`
 /// ([`unwrap`](crate::unwrap)); stamps on the map of such a surface ([`StampSpace::Map`]) end best at its edges
 /// ([`Wrap::Clamp`]), since what lies at the opposite one is another part of the mesh.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum OverlayUv {
     /// Unique ones, if those of the mesh are not: if they tile, lie on each other, or are not there. Then a `UV_1` of the mesh
     /// that is unique is taken as it is; one that is not is left alone, as something may be drawn by it, and so are uvs that
@@ -84,7 +91,7 @@ pub enum OverlayUv {
 }
 
 /// Where the stamps of a surface lie.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StampSpace {
     /// On the surface: round whatever the uvs do to it, across the borders of uv islands and never on a neighbour in the
     /// image. Takes 16 bytes a texel once something is painted, twice with a renderer. On surfaces that are posed a stamp is round
@@ -96,7 +103,7 @@ pub enum StampSpace {
 }
 
 /// What happens to a stamp at an edge of the map.
-#[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Wrap {
     /// It goes on at the opposite edge; uvs outside 0..1 tile.
     #[default]

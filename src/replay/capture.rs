@@ -17,7 +17,8 @@ use crate::picture::{PictureError, write_picture};
 #[derive(Resource, Default)]
 struct Pictures {
     expected: usize,
-    done: Vec<(u32, Image)>,
+    /// With the names of their files.
+    done: Vec<(String, Image)>,
 }
 
 /// Makes every camera draw into an image instead of a window.
@@ -39,15 +40,15 @@ pub(super) fn add_target(world: &mut World, size: UVec2) -> Handle<Image> {
 }
 
 impl Run<'_> {
-    /// Asks for a picture of the next frame.
-    pub(super) fn capture(&mut self, frame: u32) -> Result<(), ReplayError> {
+    /// Asks for a picture of the next frame, for a file of this name.
+    pub(super) fn capture(&mut self, file: String) -> Result<(), ReplayError> {
         let (Some(target), Some(_)) = (&self.target, &self.options.out) else { return Ok(()) };
         let screenshot = Screenshot::image(target.clone());
         let world = self.app.world_mut();
         world.resource_mut::<Pictures>().expected += 1;
         world.spawn(screenshot).observe(
             move |captured: On<ScreenshotCaptured>, mut pictures: ResMut<Pictures>| {
-                pictures.done.push((frame, captured.image.clone()));
+                pictures.done.push((file.clone(), captured.image.clone()));
             },
         );
         Ok(())
@@ -59,8 +60,8 @@ impl Run<'_> {
         let Some(mut pictures) = self.app.world_mut().get_resource_mut::<Pictures>() else { return Ok(()) };
         let done = std::mem::take(&mut pictures.done);
         pictures.expected -= done.len();
-        for (frame, image) in done {
-            write_png(&out.join(format!("frame_{frame:05}.png")), image)?;
+        for (file, image) in done {
+            write_png(&out.join(file), image)?;
         }
         Ok(())
     }

@@ -11,7 +11,9 @@ use super::{ReplayError, Run, give_up_after};
 use crate::clock::WeatheringClock;
 use crate::material::PorousMaterial;
 use crate::matter::SurfaceMatter;
-use crate::overlay::{CpuMaps, Overlays, SplatStats, SurfaceTotals, Weatherable};
+use crate::overlay::{
+    CpuMaps, MapLoss, MapSize, Overlays, SplatStats, SurfaceTotals, TILE_SIZE, Weatherable,
+};
 use crate::picture::{square, write_picture};
 use crate::scenario::ScenarioSurface;
 use crate::weather::DryingClock;
@@ -23,7 +25,7 @@ use crate::wetting::{Exposure, Now, Stock, SurfaceWater, WetGeometry, Wetness};
 pub struct SurfaceMaps {
     /// The surface's name in the scenario.
     pub name: String,
-    /// Texels along each side.
+    /// Texels along each side; 0 if it has no maps, for want of room. Then nothing lies on it, and there are no texels.
     pub size: u32,
     /// Colour over the surface's; premultiplied RGBA, row by row.
     pub diffuse: Vec<u8>,
@@ -43,8 +45,67 @@ pub struct SurfaceMaps {
     pub stock: Stock,
     /// Its dust, mud and snow.
     pub matter: SurfaceMatter,
+    /// What was lost with maps that were taken away, and for want of maps.
+    pub loss: MapLoss,
     /// Ticks per second of `since`.
     pub hz: u32,
+}
+
+/// Impacts so far that found maps.
+pub(super) fn to_be_painted(world: &mut World) -> u64 {
+    let mut totals = world.query::<(&SurfaceTotals, &MapLoss)>();
+    totals.iter(world).map(|(totals, loss)| totals.impacts.saturating_sub(loss.unpainted)).sum()
+}
+
+impl SurfaceMaps {
+    /// Of a surface as it is now; without colour maps unless they are on the CPU.
+    pub(crate) fn new(
+        name: String,
+        size: u32,
+        water: &SurfaceWater,
+        matter: &SurfaceMatter,
+        loss: MapLoss,
+        cpu: Option<&CpuMaps>,
+        now: &Now,
+    ) -> Self {
+        let colors = |of: fn(&CpuMaps) -> &Vec<[u8; 4]>| {
+            cpu.map(|cpu| of(cpu).as_flattened().to_vec()).unwrap_or_default()
+        };
+        Self {
+            name,
+            size,
+            diffuse: colors(|cpu| &cpu.diffuse),
+            specular: colors(|cpu| &cpu.specular),
+            normal: colors(|cpu| &cpu.normal),
+            wetness: (0..size.pow(2)).map(|texel| wetness_of(water, now, texel)).collect(),
+            since: water.texels().iter().map(|texel| texel.tick).collect(),
+            wet_fraction: f64::from(summary(water, now).wet_fraction),
+            water: water.clone(),
+            stock: water.stock(now),
+            matter: matter.clone(),
+            loss,
+            hz: now.hz,
+        }
+    }
+
+    /// Of a surface that has none.
+    fn none(name: String, surface: &Weatherable, loss: MapLoss, hz: u32) -> Self {
+        Self {
+            name,
+            size: 0,
+            diffuse: vec![],
+            specular: vec![],
+            normal: vec![],
+            wetness: vec![],
+            since: vec![],
+            wet_fraction: 0.0,
+            water: SurfaceWater::of_size(TILE_SIZE, surface.wrap(), 1.0),
+            stock: Stock::default(),
+            matter: SurfaceMatter::default(),
+            loss,
+            hz,
+        }
+    }
 }
 
 /// What has been read back so far: (surface, map, bytes).
@@ -61,24 +122,35 @@ impl Run<'_> {
         let drying = self.app.world().resource::<DryingClock>().clone();
         let world = self.app.world_mut();
         let mut query = world.query::<(
-            (Entity, &ScenarioSurface, &Weatherable, &SurfaceWater, &WetGeometry),
-            (Option<&Exposure>, Option<&PorousMaterial>, Option<&CpuMaps>, Option<&Overlays>, &SurfaceMatter),
+            (Entity, &ScenarioSurface, &Weatherable, &MapLoss, &SurfaceMatter),
+            (Option<&MapSize>, Option<&SurfaceWater>, Option<&WetGeometry>),
+            (Option<&Exposure>, Option<&PorousMaterial>, Option<&CpuMaps>, Option<&Overlays>),
         )>();
         let mut surfaces = Vec::new();
         let mut requests = Vec::new();
         let default = PorousMaterial::default();
-        for ((entity, surface, maps, water, geometry), (exposure, material, cpu, gpu, matter)) in
+        for ((entity, surface, settings, loss, matter), measured, (exposure, material, cpu, gpu)) in
             query.iter(world)
         {
+            let (Some(size), Some(water), Some(geometry)) = measured else {
+                let read = SurfaceMaps::none(surface.name.clone(), settings, *loss, clock.hz());
+                surfaces.push((surface.index, entity, read));
+                continue;
+            };
+            let size = size.texels();
             let material = material.unwrap_or(&default);
             let now = Now::new(clock.tick(), clock.hz(), &drying, &geometry.0, exposure, material);
-            let read = SurfaceMaps::new(surface.name.clone(), maps, water, matter, cpu, &now);
+            let read = SurfaceMaps::new(surface.name.clone(), size, water, matter, *loss, cpu, &now);
             if cpu.is_none()
-                && let Some(gpu) = gpu
+                && let Some(gpu) = gpu.filter(|gpu| gpu.has_colors)
             {
                 requests.push((entity, 0, Readback::texture(gpu.diffuse.clone())));
                 requests.push((entity, 1, Readback::texture(gpu.specular.clone())));
                 requests.push((entity, 2, Readback::texture(gpu.normal.clone())));
+            } else {
+                // Nothing has been painted.
+                let empty = vec![0; size.pow(2) as usize * 4];
+                (read.diffuse, read.specular, read.normal) = (empty.clone(), empty.clone(), empty);
             }
             surfaces.push((surface.index, entity, read));
         }
@@ -101,9 +173,9 @@ impl Run<'_> {
         let begun = Instant::now();
         loop {
             let world = self.app.world_mut();
-            let mut totals = world.query::<&SurfaceTotals>();
-            let impacts: u64 = totals.iter(world).map(|totals| totals.impacts).sum();
-            if world.resource::<SplatStats>().splats() + self.painted_before >= impacts {
+            let impacts = to_be_painted(world);
+            let stats = world.resource::<SplatStats>();
+            if stats.splats() + stats.dropped() + self.painted_before >= impacts {
                 // The frame that painted them is done: `step` waits for the GPU.
                 return Ok(());
             }
@@ -138,38 +210,8 @@ impl Run<'_> {
     }
 }
 
-impl SurfaceMaps {
-    /// Of a surface as it is now; without colour maps unless they are on the CPU.
-    pub(crate) fn new(
-        name: String,
-        maps: &Weatherable,
-        water: &SurfaceWater,
-        matter: &SurfaceMatter,
-        cpu: Option<&CpuMaps>,
-        now: &Now,
-    ) -> Self {
-        let colors = |of: fn(&CpuMaps) -> &Vec<[u8; 4]>| {
-            cpu.map(|cpu| of(cpu).as_flattened().to_vec()).unwrap_or_default()
-        };
-        Self {
-            name,
-            size: maps.texels(),
-            diffuse: colors(|cpu| &cpu.diffuse),
-            specular: colors(|cpu| &cpu.specular),
-            normal: colors(|cpu| &cpu.normal),
-            wetness: (0..maps.texels().pow(2)).map(|texel| wetness_of(water, now, texel)).collect(),
-            since: water.texels().iter().map(|texel| texel.tick).collect(),
-            wet_fraction: f64::from(summary(water, now).wet_fraction),
-            water: water.clone(),
-            stock: water.stock(now),
-            matter: matter.clone(),
-            hz: now.hz,
-        }
-    }
-}
-
 /// Rows of RGBA texels without what aligns them to 256 bytes on the way.
-fn without_padding(bytes: &[u8], size: u32) -> Vec<u8> {
+pub fn without_padding(bytes: &[u8], size: u32) -> Vec<u8> {
     let row = size as usize * 4;
     let padded = bytes.len() / size as usize;
     bytes.chunks(padded.max(row)).flat_map(|padded| &padded[..row]).copied().collect()
@@ -179,11 +221,11 @@ fn without_padding(bytes: &[u8], size: u32) -> Vec<u8> {
 pub(super) const MAP_NAMES: [&str; 7] =
     ["diffuse", "specular", "normal", "film", "absorbed", "wetness", "since"];
 
-/// Writes `<surface>_<map>.png` for each map: `diffuse`, `specular`, `normal` as they are; `film` and `absorbed` as 16-bit
-/// micrometres of water, `wetness` as 16-bit parts of full, `since` as 16-bit hundredths of a second of the reference
-/// time (0 is never). Values too large stop at 65,535.
+/// Writes `<surface>_<map>.png` for each map of the surfaces that have any: `diffuse`, `specular`, `normal` as they are;
+/// `film` and `absorbed` as 16-bit micrometres of water, `wetness` as 16-bit parts of full, `since` as 16-bit hundredths of
+/// a second of the reference time (0 is never). Values too large stop at 65,535.
 pub(crate) fn write_maps(folder: &Path, surfaces: &[SurfaceMaps]) -> Result<(), ReplayError> {
-    for surface in surfaces {
+    for surface in surfaces.iter().filter(|surface| surface.size > 0) {
         let path = |map| folder.join(format!("{}_{map}.png", surface.name));
         let [diffuse, specular, normal, film, absorbed, wetness, since] = MAP_NAMES.map(path);
         for (path, texels) in

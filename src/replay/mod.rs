@@ -5,12 +5,28 @@
 //! the CPU by the same integer arithmetic, and the digest over impacts and amounts comes out the same.
 //!
 //! Nothing is written before the scene is loaded; each file is written under a temporary name and then renamed.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `frame_00000.png`, ... | pictures |
+//! | `maps/` | all maps of all surfaces at the end |
+//! | `series.csv`, `timings.csv` | a row every so often: amounts and particles; how long ticks took |
+//! | `plots/*.svg` | these rows as lines |
+//! | `video.mp4` or `video.apng`, `sheet.png` | the pictures, if asked for |
+//! | `report.json` | the numbers at the end; written last |
 
 mod app;
 mod capture;
 mod files;
 mod maps;
+mod plot;
+mod plots;
 mod report;
+mod series;
+mod sheet;
+mod stages;
+mod table;
+mod video;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -19,26 +35,26 @@ use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 
 use crate::clock::WeatheringClock;
-use crate::overlay::SurfaceTotals;
 use crate::picture::PictureError;
 use crate::save::{ColorMaps, SaveError, SavedScene};
-use crate::scenario::{LoadedScenario, ScenarioError, ScenarioPlugin, ScenarioStatus};
+use crate::scenario::{LoadedScenario, ScenarioError, ScenarioPlugin, ScenarioStatus, captures};
 
 pub(crate) use app::headless;
 pub use app::{require_adapter, task_pools};
 pub use capture::write_png;
-pub use files::write_atomic;
-pub use maps::SurfaceMaps;
+pub use files::{DONE_FILE, write_atomic};
 pub(crate) use maps::write_maps;
+pub use maps::{SurfaceMaps, without_padding};
 pub(crate) use report::water_of;
 pub use report::{ParticleReport, Report, SurfaceReport, Timing, WaterReport, WorkReport};
+use series::SeriesTables;
 
 /// What to run and what to write.
 #[derive(Debug, Clone)]
 pub struct ReplayOptions {
     /// The scenario.
     pub scenario: LoadedScenario,
-    /// Folder for `frame_*.png`, `maps/` and `report.json`; made if missing. `None` writes nothing.
+    /// Folder for all that is written; made if missing. `None` writes nothing.
     pub out: Option<PathBuf>,
     /// Pictures per second of weather time; at least 1. Without a renderer there are none.
     pub fps: u32,
@@ -57,11 +73,20 @@ pub struct ReplayOptions {
     pub resume: Option<PathBuf>,
     /// Folder to save the scene into at the end. Of its own: neither `out` nor one that holds it.
     pub save: Option<PathBuf>,
+    /// Seconds of weather time between two rows of the series, at least a tick; without, one, or more if a run is so long
+    /// that the rows would be too many.
+    pub every: Option<f32>,
+    /// Make a video of the pictures: with ffmpeg, or else an animated PNG. Needs `out` and `render`.
+    pub video: bool,
+    /// Make a contact sheet of so many pictures, up to [`Self::MAX_SHEET`]. Needs `out` and `render`.
+    pub sheet: Option<u32>,
 }
 
 impl ReplayOptions {
     /// The widest and highest picture.
     pub const MAX_SIZE: u32 = 8192;
+    /// The most pictures on a contact sheet.
+    pub const MAX_SHEET: u32 = 400;
 
     /// A run of `scenario` that draws small pictures at 24 a second.
     pub fn new(scenario: LoadedScenario) -> Self {
@@ -76,6 +101,9 @@ impl ReplayOptions {
             render: true,
             resume: None,
             save: None,
+            every: None,
+            video: false,
+            sheet: None,
         }
     }
 }
@@ -148,7 +176,7 @@ const PATIENCE_SECONDS: u64 = 300;
 /// [`ReplayError`]; then nothing half-written is left, though pictures that were finished before stay.
 pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Result<Report, ReplayError> {
     let begun = Instant::now();
-    options.check()?;
+    let every = options.check()?;
     let saved = options.resume.as_deref().map(SavedScene::read).transpose()?;
     let mut run = Run::load(options)?;
     if let (Some(saved), Some(folder)) = (&saved, &options.resume) {
@@ -167,18 +195,33 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
         |tick: u32| (u64::from(tick) * u64::from(options.fps)).div_ceil(u64::from(clock.hz())) as u32;
     // Those before were drawn before it was saved.
     let frames = frame_at(tick)..(if options.render { frame_at(ticks) } else { 0 });
+    let captures = captures(&options.scenario.scenario);
+    let begins = captures.partition_point(|(due, _)| *due < tick || (*due == tick && tick > 0));
+    let (taken, to_take) = captures.split_at(begins);
     if let Some(folder) = &options.save {
         SavedScene::check_folder(folder)?;
     }
+    let mut earlier = None;
     if let Some(out) = &options.out {
         files::require_writable(out)?;
-        files::remove_earlier_run(out, frames.start)?;
+        earlier = options.resume.is_some().then(|| SeriesTables::read(out));
+        files::remove_earlier_outputs(out)?;
+        let taken: Vec<_> = taken.iter().map(|(_, name)| files::capture_file(name)).collect();
+        files::remove_earlier_run(out, frames.start, &taken)?;
+        run.begin_series(every);
     }
     let loaded = begun.elapsed();
 
-    for frame in frames.clone() {
-        let due = (u64::from(frame) * u64::from(clock.hz()) / u64::from(options.fps)) as u32;
-        run.capture(frame)?;
+    let due_at = |frame: u32| (u64::from(frame) * u64::from(clock.hz()) / u64::from(options.fps)) as u32;
+    let mut pictures: Vec<_> =
+        frames.clone().map(|frame| (due_at(frame), files::frame_file(frame))).collect();
+    if options.render {
+        let named = to_take.iter().filter(|(due, _)| *due <= ticks);
+        pictures.extend(named.map(|(due, name)| (*due, files::capture_file(name))));
+        pictures.sort_by_key(|(due, _)| *due);
+    }
+    for (due, file) in pictures {
+        run.capture(file)?;
         run.step(due - tick)?;
         tick = due;
         progress(Progress { tick, ticks });
@@ -191,6 +234,10 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
         progress(Progress { tick, ticks });
     }
     run.finish_captures()?;
+    let mut series = run.end_series();
+    if let (Some(series), Some(earlier)) = (&mut series, &earlier) {
+        series.put_before(earlier);
+    }
     let simulated = begun.elapsed() - loaded;
 
     let maps = run.read_maps()?;
@@ -203,6 +250,11 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
     let report = report::report(run.app.world_mut(), options, &maps, timing);
     if let Some(out) = &options.out {
         maps::write_maps(&out.join("maps"), &maps)?;
+        if let Some(series) = &series {
+            series.write(out)?;
+            plots::write_plots(out, &report.scenario, series)?;
+        }
+        options.write_pictures(out)?;
         write_atomic(&out.join("report.json"), &serde_json::to_vec_pretty(&report)?)?;
     }
     if let Some(folder) = &options.save {
@@ -217,7 +269,27 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
 }
 
 impl ReplayOptions {
-    fn check(&self) -> Result<(), ReplayError> {
+    /// What is made of the pictures in the folder.
+    fn write_pictures(&self, out: &Path) -> Result<(), ReplayError> {
+        if !self.video && self.sheet.is_none() {
+            return Ok(());
+        }
+        let frames = files::frames(out);
+        if let Some(count) = self.sheet {
+            let seconds = |number: u32| f64::from(number) / f64::from(self.fps);
+            let pictures: Vec<_> =
+                frames.iter().map(|(number, path)| (seconds(*number), path.clone())).collect();
+            sheet::write_sheet(out, &pictures, count)?;
+        }
+        if self.video {
+            let files: Vec<_> = frames.into_iter().map(|(_, path)| path).collect();
+            video::write_video(out, &files, self.fps)?;
+        }
+        Ok(())
+    }
+
+    /// Checks all options, and tells how many ticks apart the rows of the series are.
+    fn check(&self) -> Result<u32, ReplayError> {
         let wrong =
             |option, value: String, expected: String| Err(ReplayError::Option { option, value, expected });
         if self.fps == 0 || self.fps > WeatheringClock::MAX_HZ {
@@ -250,7 +322,17 @@ impl ReplayOptions {
             let value = save.display().to_string();
             return wrong("save", value, "a folder of its own, beside those of `out` or in them".into());
         }
-        Ok(())
+        if let Some(count) = self.sheet
+            && !(1..=Self::MAX_SHEET).contains(&count)
+        {
+            return wrong("sheet", count.to_string(), format!("1 to {}", Self::MAX_SHEET));
+        }
+        for (option, is_set) in [("video", self.video), ("sheet", self.sheet.is_some())] {
+            if is_set && (self.out.is_none() || !self.render) {
+                return wrong(option, "set".into(), "used with `out` and with `render`".into());
+            }
+        }
+        self.series_ticks()
     }
 }
 
@@ -300,8 +382,7 @@ impl<'a> Run<'a> {
     /// Puts a saved scene in place of the fresh one.
     fn resume(&mut self, saved: &SavedScene, folder: &Path) -> Result<(), ReplayError> {
         saved.restore(self.app.world_mut(), &self.options.scenario, folder)?;
-        let world = self.app.world_mut();
-        self.painted_before = world.query::<&SurfaceTotals>().iter(world).map(|totals| totals.impacts).sum();
+        self.painted_before = maps::to_be_painted(self.app.world_mut());
         for _ in 0..3 {
             self.step(0)?;
         }

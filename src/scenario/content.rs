@@ -55,23 +55,7 @@ impl LoadedScenario {
     /// Loads and generates; without `looks` only what a run without a renderer needs.
     pub(super) fn content(&self, looks: bool) -> Result<Content, ScenarioError> {
         let scenario = &self.scenario;
-        let mut effects = Vec::new();
-        for (index, emitter) in scenario.emitters.iter().enumerate() {
-            let field = format!("emitters[{index}].effect");
-            let path = self.resolve(&field, &emitter.effect)?;
-            let bytes = std::fs::read(path).map_err(|e| self.content_error(&field, &emitter.effect, e))?;
-            let wrong = |e| self.content_error(&field, &emitter.effect, e);
-            let mut effect = WeatherEffect::from_ron(&bytes).map_err(wrong)?;
-            let mut files = BTreeMap::new();
-            for file in effect.stamps.files() {
-                let beside = Path::new(&emitter.effect).with_file_name(file);
-                let path = self.resolve(&field, &beside.to_string_lossy())?;
-                let bytes = std::fs::read(path).map_err(|e| self.content_error(&field, file, e))?;
-                files.insert(file.to_owned(), bytes);
-            }
-            effect.stamp_set = effect.stamps.read(&files).map_err(wrong)?;
-            effects.push(effect);
-        }
+        let effects = self.effects()?;
         let mut meshes = Vec::new();
         for (index, surface) in scenario.surfaces.iter().enumerate() {
             let mesh = generate(&surface.mesh);
@@ -120,6 +104,63 @@ impl LoadedScenario {
             }
         }
         Ok(Content { effects, meshes, materials, wet_maps, environment })
+    }
+
+    /// The effects of all emitters, in their order.
+    fn effects(&self) -> Result<Vec<WeatherEffect>, ScenarioError> {
+        let mut effects = Vec::new();
+        for (index, emitter) in self.scenario.emitters.iter().enumerate() {
+            let field = format!("emitters[{index}].effect");
+            let path = self.resolve(&field, &emitter.effect)?;
+            let bytes = std::fs::read(path).map_err(|e| self.content_error(&field, &emitter.effect, e))?;
+            let wrong = |e| self.content_error(&field, &emitter.effect, e);
+            let mut effect = WeatherEffect::from_ron(&bytes).map_err(wrong)?;
+            let mut files = BTreeMap::new();
+            for file in effect.stamps.files() {
+                let beside = Path::new(&emitter.effect).with_file_name(file);
+                let path = self.resolve(&field, &beside.to_string_lossy())?;
+                let bytes = std::fs::read(path).map_err(|e| self.content_error(&field, file, e))?;
+                files.insert(file.to_owned(), bytes);
+            }
+            effect.stamp_set = effect.stamps.read(&files).map_err(wrong)?;
+            effects.push(effect);
+        }
+        Ok(effects)
+    }
+
+    /// Reads all that the scenario names, as a run would; what is generated is generated, but for stones. Returns the number
+    /// of triangles of all surfaces. Needs no renderer.
+    ///
+    /// # Errors
+    /// [`ScenarioError::Content`] for the first that cannot be used.
+    pub fn check_content(&self) -> Result<u64, ScenarioError> {
+        self.effects()?;
+        let triangles = self.surface_meshes()?.iter().map(|(_, mesh, ..)| mesh.positions.len() as u64).sum();
+        for (index, surface) in self.scenario.surfaces.iter().enumerate() {
+            if let Some(map) = &surface.wet_map {
+                self.photo(&format!("surfaces[{index}].wet_map.map"), &map.map, false)?;
+            }
+        }
+        for (name, material) in &self.scenario.materials {
+            let photo = match &material.texture {
+                TextureSpec::Photo(file) => Some(("texture", file)),
+                _ => None,
+            };
+            let surface = match &material.surface {
+                SurfaceTextureSpec::File(file) => Some(("surface", file)),
+                _ => None,
+            };
+            let wet_color = material.wet_color.as_ref().map(|file| ("wet_color", file));
+            for (field, file) in [photo, surface, wet_color].into_iter().flatten() {
+                self.photo(&format!("materials.{name}.{field}"), file, false)?;
+            }
+        }
+        if let Some(spec) = &self.scenario.environment {
+            let path = self.resolve("environment.map", &spec.map)?;
+            let unusable = |e| self.content_error("environment.map", &spec.map, e);
+            load_equirect(&path).map_err(unusable)?;
+        }
+        Ok(triangles)
     }
 
     /// The shape of every surface, for tools that need no app: name, triangles with the uvs that its maps lie over, where it

@@ -9,7 +9,8 @@ use crate::collision::Impacts;
 use crate::matter::SurfaceMatter;
 use crate::wetting::SurfaceWater;
 
-/// Hash over all impacts so far: tick, particle, surface, triangle, uv, water. Needs no renderer.
+/// Hash over all impacts so far: tick, particle, surface, triangle, uv, water; and over all events that acted. Needs no
+/// renderer.
 ///
 /// A chain: each tick's hash is over the one before and what happened in it. So it can be kept and gone on with.
 #[derive(Resource, Debug, Default, Clone, Copy, PartialEq, Eq)]

@@ -4,6 +4,10 @@
 //! names the file, the field and the value. [`ScenarioPlugin`] spawns it and moves its emitters and camera by the
 //! weathering clock, so that a run depends on nothing but the file and the seed; [`Digest`] proves it.
 //!
+//! A file may include others and have variants ([`ScenarioPart`]); what happens when is a list of events ([`EventSpec`]),
+//! which also take pictures and say what has to be true ([`Expectations`]). All fields, with units and defaults, are in
+//! `docs/scenarios.md`; [`schema_json`] is the same for programs.
+//!
 //! Paths in the file are relative to its *tree*: the folder of the file or, where that folder is called
 //! `scenarios`, the one above, so that scenarios share `models/` and `textures/` beside them. Nothing outside the
 //! tree is ever read.
@@ -11,23 +15,35 @@
 mod content;
 mod digest;
 mod error;
+mod files;
 mod gltf_uris;
 mod load;
+mod merge;
 mod motion;
 mod reset;
 mod schema;
 mod spawn;
+mod switch;
+mod timeline;
 mod validate;
 
 pub use content::SurfaceMesh;
 pub use digest::{Digest, amounts_digest};
 pub use error::ScenarioError;
 pub use load::LoadedScenario;
-pub use motion::ScenarioCamera;
+pub use motion::{ByHand, ScenarioCamera};
 pub use reset::reset_scenario;
+pub use schema::schema_json;
 pub use schema::{
-    CameraKey, CameraSpec, EmitterKey, EmitterSpec, EnvironmentSpec, MaterialSpec, MeshSpec, Scenario,
-    SunSpec, SurfaceSpec, SurfaceTextureSpec, TextureSpec, WeatherSpec, WetMapSpec,
+    CameraKey, CameraSpec, EmitterChange, EmitterKey, EmitterSpec, EnvironmentSpec, MapBudgetSpec,
+    MaterialSpec, MeshSpec, Scenario, ScenarioPart, SunSpec, SurfaceSpec, SurfaceTextureSpec, TextureSpec,
+    WeatherPart, WeatherSpec, WetMapSpec,
 };
-pub use spawn::{ScenarioPlugin, ScenarioStatus, ScenarioSurface};
+pub use spawn::{AssetTree, ScenarioPlugin, ScenarioStatus, ScenarioSurface, SceneEntity};
+pub use switch::{PreparedScenario, switch_scenario};
+pub use timeline::{
+    Action, BrushEvent, CameraMove, EmitterMove, EventSpec, Expectation, ExpectationOutcome, Expectations,
+    MaterialChange, Quantity, WeatherChange,
+};
+pub(crate) use timeline::{captures, rewind};
 pub(crate) use validate::check_weather;

@@ -12,7 +12,30 @@ pub(super) struct EmitterMotion {
     pub(super) keys: Vec<EmitterKey>,
     pub(super) start: f32,
     pub(super) stop: f32,
+    /// The first ticks in which it is on, or off, in order; in place of `start` and `stop` if there are any.
+    pub(super) switches: Vec<(u32, bool)>,
 }
+
+impl EmitterMotion {
+    /// Whether it works in the tick that the clock shows.
+    fn is_on(&self, clock: &WeatheringClock) -> bool {
+        let before = self.switches.partition_point(|(tick, _)| *tick <= clock.tick());
+        match (before.checked_sub(1).and_then(|last| self.switches.get(last)), self.switches.first()) {
+            (Some((_, on)), _) => *on,
+            // What begins by being switched off has been on.
+            (None, Some((_, first))) => !first,
+            (None, None) => {
+                let t = clock.seconds() as f32;
+                // The tick that ends at `stop` is the last one, the tick that begins at `start` the first.
+                t > self.start && t <= self.stop + 0.5 * clock.delta_secs()
+            }
+        }
+    }
+}
+
+/// An emitter of the scenario that somebody has taken in hand: neither its keys nor its working hours apply any more.
+#[derive(Component, Debug, Default, Clone, Copy)]
+pub struct ByHand;
 
 /// The scenario's camera. Follows its keys unless the component is removed.
 #[derive(Component, Debug)]
@@ -28,7 +51,7 @@ fn look(from: Vec3, at: Vec3) -> Transform {
 }
 
 /// The two keys around `t` and how far it is between them.
-fn between<K: Copy>(keys: &[K], time: impl Fn(&K) -> f32, t: f32) -> Option<(K, K, f32)> {
+pub(super) fn between<K: Copy>(keys: &[K], time: impl Fn(&K) -> f32, t: f32) -> Option<(K, K, f32)> {
     let next = keys.partition_point(|key| time(key) <= t);
     let (Some(after), Some(before)) = (keys.get(next), next.checked_sub(1).map(|i| keys[i])) else {
         let end = if next == 0 { keys.first() } else { keys.last() };
@@ -41,12 +64,14 @@ fn between<K: Copy>(keys: &[K], time: impl Fn(&K) -> f32, t: f32) -> Option<(K, 
 /// Moves and switches emitters at the start of a tick; writes their global transform, since the tick needs it now.
 pub(super) fn move_emitters(
     clock: Res<WeatheringClock>,
-    mut emitters: Query<(&EmitterMotion, &mut Emitter, &mut Transform, &mut GlobalTransform)>,
+    mut emitters: Query<
+        (&EmitterMotion, &mut Emitter, &mut Transform, &mut GlobalTransform),
+        Without<ByHand>,
+    >,
 ) {
     let t = clock.seconds() as f32;
     for (motion, mut emitter, mut transform, mut global) in &mut emitters {
-        // The tick that ends at `stop` is the last one, the tick that begins at `start` the first.
-        emitter.enabled = t > motion.start && t <= motion.stop + 0.5 * clock.delta_secs();
+        emitter.enabled = motion.is_on(&clock);
         if let Some((from, to, part)) = between(&motion.keys, |key| key.t, t) {
             *transform = look(from.position.lerp(to.position, part), from.target.lerp(to.target, part));
             *global = GlobalTransform::from(*transform);
@@ -87,10 +112,26 @@ mod tests {
     }
 
     #[test]
+    fn switches_take_the_place_of_hours() {
+        let on = |switches: &[(u32, bool)]| {
+            let motion = EmitterMotion { keys: vec![], start: 0.0, stop: 1.0, switches: switches.to_vec() };
+            let mut clock = WeatheringClock::new(2);
+            [(); 5].map(|()| {
+                clock.advance();
+                motion.is_on(&clock)
+            })
+        };
+        assert_eq!(on(&[]), [true, true, false, false, false]);
+        assert_eq!(on(&[(2, true), (4, false)]), [false, true, true, false, false]);
+        assert_eq!(on(&[(3, false)]), [true, true, false, false, false]);
+        assert_eq!(on(&[(3, false), (3, true)]), [true; 5]);
+    }
+
+    #[test]
     fn emitters_work_their_hours_and_point_where_they_should() {
         let mut world = World::new();
         world.insert_resource(WeatheringClock::new(2));
-        let motion = EmitterMotion { keys: vec![key(0.0, 4.0)], start: 1.0, stop: 2.0 };
+        let motion = EmitterMotion { keys: vec![key(0.0, 4.0)], start: 1.0, stop: 2.0, switches: vec![] };
         let emitter = world.spawn((motion, Emitter::default(), GlobalTransform::default())).id();
         let mut schedule = Schedule::default();
         schedule.add_systems(move_emitters);

@@ -6,7 +6,7 @@ use std::fmt::Display;
 use bevy::math::{Vec2, Vec3};
 
 use super::{
-    EmitterSpec, LoadedScenario, MaterialSpec, MeshSpec, Scenario, ScenarioError, SurfaceSpec,
+    EmitterSpec, LoadedScenario, MapBudgetSpec, MaterialSpec, MeshSpec, Scenario, ScenarioError, SurfaceSpec,
     SurfaceTextureSpec, TextureSpec,
 };
 use crate::clock::WeatheringClock;
@@ -20,7 +20,7 @@ use crate::weather::Weather;
 const FASTEST: f32 = 1000.0;
 
 /// The farthest coordinate: beyond it an f32 is coarser than a drop.
-const FAR: f32 = 1.0e5;
+pub(super) const FAR: f32 = 1.0e5;
 
 /// The first number of the weather that is out of its range.
 pub(crate) fn check_weather(weather: &Weather) -> Result<(), OutOfRange> {
@@ -63,6 +63,12 @@ impl LoadedScenario {
         self.vector("wind", scenario.wind, FASTEST)?;
         let most = f64::from(Scenario::MAX_PARTICLES);
         self.range("max_particles", f64::from(scenario.max_particles), 1.0, most)?;
+        if let Some(MapBudgetSpec { mib, texel_mm }) = scenario.map_budget {
+            self.positive("map_budget.mib", mib, MapBudgetSpec::MAX_MIB)?;
+            if let Some(texel_mm) = texel_mm {
+                self.positive("map_budget.texel_mm", texel_mm, MapBudgetSpec::MAX_TEXEL_MM)?;
+            }
+        }
         self.validate_view()?;
         // Wind and direction of the sun have been checked by their own names.
         check_weather(&scenario.weather()).map_err(|wrong| self.out_of_range("weather", wrong))?;
@@ -94,7 +100,7 @@ impl LoadedScenario {
         for (index, emitter) in scenario.emitters.iter().enumerate() {
             self.validate_emitter(&format!("emitters[{index}]"), emitter)?;
         }
-        Ok(())
+        self.validate_events()
     }
 
     fn validate_view(&self) -> Result<(), ScenarioError> {
@@ -294,7 +300,7 @@ impl LoadedScenario {
         Ok(())
     }
 
-    fn look(&self, field: &str, from: &str, eye: Vec3, target: Vec3) -> Result<(), ScenarioError> {
+    pub(super) fn look(&self, field: &str, from: &str, eye: Vec3, target: Vec3) -> Result<(), ScenarioError> {
         self.vector(&format!("{field}.{from}"), eye, FAR)?;
         self.vector(&format!("{field}.target"), target, FAR)?;
         if eye.distance(target) < 1.0e-6 {
@@ -311,18 +317,18 @@ impl LoadedScenario {
         color.into_iter().try_for_each(|channel| self.not_negative(field, channel, 1.0))
     }
 
-    fn vector(&self, field: &str, vector: Vec3, most: f32) -> Result<(), ScenarioError> {
+    pub(super) fn vector(&self, field: &str, vector: Vec3, most: f32) -> Result<(), ScenarioError> {
         for (axis, value) in ["x", "y", "z"].into_iter().zip(vector.to_array()) {
             self.range(&format!("{field}.{axis}"), f64::from(value), f64::from(-most), f64::from(most))?;
         }
         Ok(())
     }
 
-    fn not_negative(&self, field: &str, value: f32, most: f32) -> Result<(), ScenarioError> {
+    pub(super) fn not_negative(&self, field: &str, value: f32, most: f32) -> Result<(), ScenarioError> {
         self.range(field, f64::from(value), 0.0, f64::from(most))
     }
 
-    fn positive(&self, field: &str, value: f32, most: f32) -> Result<(), ScenarioError> {
+    pub(super) fn positive(&self, field: &str, value: f32, most: f32) -> Result<(), ScenarioError> {
         // Written so that NaN fails.
         if value > 0.0 && value <= most {
             Ok(())
@@ -331,7 +337,7 @@ impl LoadedScenario {
         }
     }
 
-    fn range(&self, field: &str, value: f64, least: f64, most: f64) -> Result<(), ScenarioError> {
+    pub(super) fn range(&self, field: &str, value: f64, least: f64, most: f64) -> Result<(), ScenarioError> {
         // Written so that NaN fails.
         if value >= least && value <= most {
             Ok(())
@@ -340,22 +346,19 @@ impl LoadedScenario {
         }
     }
 
-    fn out_of_range(&self, field: &str, wrong: OutOfRange) -> ScenarioError {
+    pub(super) fn out_of_range(&self, field: &str, wrong: OutOfRange) -> ScenarioError {
         let OutOfRange { field: inner, value, least, most } = wrong;
         self.value(format!("{field}.{inner}"), value, format!("{least} to {most}"))
     }
 
-    fn value(
+    pub(super) fn value(
         &self,
         field: impl Into<String>,
         value: impl Display,
         expected: impl Into<String>,
     ) -> ScenarioError {
-        ScenarioError::Value {
-            file: self.file.clone(),
-            field: field.into(),
-            value: value.to_string(),
-            expected: expected.into(),
-        }
+        let field: String = field.into();
+        let (file, field) = self.written(&field);
+        ScenarioError::Value { file, field, value: value.to_string(), expected: expected.into() }
     }
 }

@@ -36,6 +36,7 @@ mod ownership;
 mod points;
 mod posed;
 mod prepare;
+mod put_back;
 pub(crate) mod query;
 mod rim;
 mod run_off;
@@ -61,6 +62,7 @@ pub use geometry::{Link, Side, TexelGeometry};
 pub use marks::Marks;
 pub use points::{SurfacePoint, surface_points};
 pub use prepare::WetGeometry;
+pub(crate) use prepare::{ExchangeMatter, put_matter};
 pub use query::{BecameWet, Dried, SurfaceWetness, WatchWetness, Wetness, WetnessQuery};
 pub use soak::Drop;
 pub use surface::{Ledger, Stock, SurfaceWater};
@@ -101,6 +103,7 @@ impl Plugin for WettingPlugin {
             .add_message::<BecameWet>()
             .add_message::<Dried>()
             .add_observer(prepare::release_surface)
+            .add_observer(prepare::release_maps)
             .add_systems(
                 PreUpdate,
                 (

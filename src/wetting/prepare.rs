@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use bevy::ecs::system::SystemParam;
 use bevy::math::Mat3A;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
@@ -12,7 +13,7 @@ use crate::clock::WeatheringClock;
 use crate::collision::{DeformingCollider, MeshBvh, SurfaceCollider};
 use crate::material::PorousMaterial;
 use crate::matter::{FallingSnow, MatterQueue, SurfaceMatter};
-use crate::overlay::{TexelArea, Weatherable, Wrap};
+use crate::overlay::{MapSize, TexelArea, Weatherable, Wrap};
 use crate::weather::DryingClock;
 
 /// The shape of a surface's texels, and which lie beside each other. Comes some frames after its collider.
@@ -44,7 +45,7 @@ impl Measured {
 
     fn is_of(
         &self,
-        surface: &Weatherable,
+        map: (u32, [Wrap; 2]),
         collider: &SurfaceCollider,
         transform: &GlobalTransform,
         is_posed: bool,
@@ -58,15 +59,13 @@ impl Measured {
         };
         // A degree or two of turning changes nothing worth measuring again.
         let turned = (0..3).any(|axis| change(axis) > 0.03 * scale);
-        !turned
-            && (self.size, self.wrap) == (surface.texels(), surface.wrap())
-            && Arc::ptr_eq(&self.bvh, &collider.0)
+        !turned && (self.size, self.wrap) == map && Arc::ptr_eq(&self.bvh, &collider.0)
     }
 }
 
 type Measurable = (
     Entity,
-    Ref<'static, Weatherable>,
+    (Ref<'static, Weatherable>, Ref<'static, MapSize>),
     Ref<'static, SurfaceCollider>,
     &'static TexelArea,
     Ref<'static, GlobalTransform>,
@@ -86,27 +85,28 @@ pub(super) fn measure_surfaces(
     drying: Res<DryingClock>,
     mut surfaces: Query<Measurable>,
 ) {
-    for (entity, surface, collider, texel, transform, mut measured, mut water, past, deforming) in
+    for (entity, (surface, map), collider, texel, transform, mut measured, mut water, past, deforming) in
         &mut surfaces
     {
         let is_posed = deforming.is_some_and(|deforming| deforming.posed().is_some());
-        let changed = surface.is_changed() || collider.is_changed() || transform.is_changed();
+        let changed =
+            surface.is_changed() || map.is_changed() || collider.is_changed() || transform.is_changed();
+        let (size, wrap) = (map.texels(), surface.wrap());
         // What is being measured is finished first: a surface that keeps turning is measured as fast as that goes.
         let stale = match &measured {
             None => true,
             Some(measured) if measured.task.is_some() => false,
             Some(measured) => {
                 let changed = changed || measured.late;
-                changed && !measured.is_of(&surface, &collider, &transform, is_posed)
+                changed && !measured.is_of((size, wrap), &collider, &transform, is_posed)
             }
         };
-        let (size, wrap) = (surface.texels(), surface.wrap());
         if stale {
             if let Some(water) = &mut water
                 && (water.size, water.wrap) != (size, wrap)
             {
                 // What was on the old maps is gone with them.
-                **water = SurfaceWater::new(&surface, texel.mean_mm2);
+                **water = SurfaceWater::of_size(size, wrap, texel.mean_mm2);
                 commands.entity(entity).remove::<(WetGeometry, Exposure)>();
             }
             let (affine, bvh) = (transform.affine(), collider.0.clone());
@@ -148,7 +148,7 @@ pub(super) fn measure_surfaces(
             entity.remove::<Exposure>();
         }
         if water.is_none() {
-            entity.insert(SurfaceWater::new(&surface, texel.mean_mm2));
+            entity.insert(SurfaceWater::of_size(size, wrap, texel.mean_mm2));
         }
     }
 }
@@ -183,6 +183,57 @@ pub(super) fn settle_before_new_material(
             water.settle_all(&Now::new(clock.tick(), clock.hz(), &drying, &geometry.0, exposure, &former));
         }
     }
+}
+
+type Exchanged = (
+    Entity,
+    &'static mut PorousMaterial,
+    Option<&'static mut FormerMaterial>,
+    Option<(&'static mut SurfaceWater, &'static WetGeometry, Option<&'static Exposure>)>,
+);
+
+/// Makes surfaces of other matter within a tick. What is exchanged between ticks is settled in the next frame, and so may
+/// depend on how ticks fall into frames; this does not.
+#[derive(SystemParam)]
+pub(crate) struct ExchangeMatter<'w, 's> {
+    clock: Res<'w, WeatheringClock>,
+    drying: Res<'w, DryingClock>,
+    commands: Commands<'w, 's>,
+    surfaces: Query<'w, 's, Exchanged>,
+}
+
+impl ExchangeMatter<'_, '_> {
+    /// The surface is of this matter from the start of the tick that is under way; until then it absorbed and dried as what
+    /// it was.
+    pub(crate) fn exchange(&mut self, surface: Entity, material: PorousMaterial) {
+        let Ok((entity, mut current, former, water)) = self.surfaces.get_mut(surface) else { return };
+        if let Some((mut water, geometry, exposure)) = water
+            && water.is_wet()
+        {
+            let before = self.clock.tick().saturating_sub(1);
+            let now = Now::new(before, self.clock.hz(), &self.drying, &geometry.0, exposure, &current);
+            water.settle_all(&now);
+        }
+        *current = material;
+        match former {
+            Some(mut former) => former.0 = material,
+            None => {
+                self.commands.entity(entity).insert(FormerMaterial(material));
+            }
+        }
+    }
+}
+
+/// Makes a surface of other matter without settling its water: it has been this matter all along.
+pub(crate) fn put_matter(world: &mut World, surface: Entity, material: PorousMaterial) {
+    if let Ok(mut entity) = world.get_entity_mut(surface) {
+        entity.insert((material, FormerMaterial(material)));
+    }
+}
+
+/// A surface without maps has no water any more. What is queued for it, and what is falling off it, stays.
+pub(super) fn release_maps(removed: On<Remove, MapSize>, mut commands: Commands) {
+    commands.entity(removed.entity).try_remove::<(WetGeometry, Measured, SurfaceWater, Exposure)>();
 }
 
 /// A surface that is not [`Weatherable`] any more is not wet any more.

@@ -33,6 +33,8 @@ pub struct SurfaceWater {
 }
 
 /// What has become of the water of a surface; units.
+///
+/// `received + painted` is the water in and on it, `evaporated`, `dripped`, `spilled` and `wiped`. To the unit.
 #[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Ledger {
     /// Came with particles.
@@ -43,6 +45,12 @@ pub struct Ledger {
     pub dripped: u64,
     /// Ran off beyond what a texel can hold.
     pub spilled: u64,
+    /// Came by a [brush](crate::brush).
+    #[serde(default)]
+    pub painted: u64,
+    /// Taken away by a brush.
+    #[serde(default)]
+    pub wiped: u64,
 }
 
 /// Which tiles have something to do. One byte of flags for each, and lists of those that are set, in ascending order
@@ -164,11 +172,16 @@ impl<'a> Now<'a> {
 }
 
 impl SurfaceWater {
-    /// Dry maps for a surface whose texels have this mean area, mm².
+    /// Dry maps for a surface, as large as it allows, whose texels have this mean area, mm².
     pub fn new(surface: &Weatherable, mean_mm2: f32) -> Self {
+        Self::of_size(surface.texels(), surface.wrap(), mean_mm2)
+    }
+
+    /// Dry maps with so many texels along each side, of this mean area, mm², and these edges.
+    pub fn of_size(size: u32, wrap: [Wrap; 2], mean_mm2: f32) -> Self {
         Self {
-            size: surface.texels(),
-            wrap: surface.wrap(),
+            size,
+            wrap,
             units: Units::for_area(mean_mm2),
             texels: Vec::new(),
             marks: Vec::new(),
@@ -367,6 +380,40 @@ impl SurfaceWater {
         self.ledger.spilled += units - added;
         self.tiles.touch(tile);
         tile
+    }
+
+    /// A brush brings water to a texel, now. Makes room for the first.
+    pub(crate) fn paint(&mut self, now: &Now, texel: u32, units: u64) {
+        self.wake(now.material.leaves_marks());
+        let tile = self.add(now, texel, units);
+        self.ledger.painted += units;
+        super::note_arrival(self, now, texel, tile);
+        self.rained_at = now.tick;
+    }
+
+    /// A brush takes a part of a texel's water away, 0..=1, now; how much it was, units.
+    pub(crate) fn wipe(&mut self, now: &Now, texel: u32, part: f64) -> u64 {
+        if self.texels.get(texel as usize).is_none_or(TexelWater::is_dry) {
+            return 0;
+        }
+        self.settle(now, texel);
+        let water = &mut self.texels[texel as usize];
+        let before = water.total();
+        // Never more than there is: the conversion saturates, and takes NaN for 0.
+        let left = |units: u32| units - ((f64::from(units) * part).round() as u32).min(units);
+        (water.film, water.pores) = (left(water.film), left(water.pores));
+        let gone = before - water.total();
+        self.ledger.wiped += gone;
+        if gone > 0 {
+            let tile = self.tile_of(texel);
+            self.tiles.touch(tile);
+            // What stands or soaks beside it may come over.
+            self.tiles.run(tile);
+            if now.matter.capacity_mm > 0.0 {
+                self.tiles.spread(tile);
+            }
+        }
+        gone
     }
 
     /// Film and absorbed water of all texels now, and what has evaporated by now; units.

@@ -1,6 +1,8 @@
 //! `weathering`: replays scenarios to pictures and numbers, opens them to play with, and bakes scenes.
 
 mod bake;
+mod batch;
+mod check;
 mod cli;
 mod replay;
 mod sandbox;
@@ -8,21 +10,29 @@ mod stamps;
 mod wet_texture;
 mod wetmap;
 
+use std::error::Error;
 use std::process::ExitCode;
 
 use clap::Parser;
 
+/// What has done all it should.
+fn done(result: Result<(), Box<dyn Error>>) -> Result<ExitCode, Box<dyn Error>> {
+    result.map(|()| ExitCode::SUCCESS)
+}
+
 fn main() -> ExitCode {
     let result = match cli::Cli::parse().command {
         cli::Command::Replay(arguments) => replay::run(&arguments),
-        cli::Command::Sandbox(arguments) => sandbox::run(&arguments),
-        cli::Command::Wetmap(command) => wetmap::run(&command),
-        cli::Command::Bake(arguments) => bake::run(&arguments),
-        cli::Command::Stamps(arguments) => stamps::run(&arguments),
-        cli::Command::WetTexture(arguments) => wet_texture::run(&arguments),
+        cli::Command::Check(arguments) => check::run(&arguments),
+        cli::Command::Schema => check::print_schema(),
+        cli::Command::Sandbox(arguments) => done(sandbox::run(&arguments)),
+        cli::Command::Wetmap(command) => done(wetmap::run(&command)),
+        cli::Command::Bake(arguments) => done(bake::run(&arguments)),
+        cli::Command::Stamps(arguments) => done(stamps::run(&arguments)),
+        cli::Command::WetTexture(arguments) => done(wet_texture::run(&arguments)),
     };
     match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         Err(error) => {
             eprintln!("error: {error}");
             ExitCode::from(2)

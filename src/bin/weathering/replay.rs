@@ -1,16 +1,30 @@
 //! `weathering replay`.
 
 use std::error::Error;
+use std::path::Path;
+use std::process::ExitCode;
 
 use bevy::log::tracing_subscriber;
 use bevy_weathering::replay::{ReplayOptions, replay};
-use bevy_weathering::scenario::Scenario;
+use bevy_weathering::scenario::{Expectation, ExpectationOutcome, Scenario};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::batch;
 use crate::cli::ReplayArgs;
 
-pub fn run(arguments: &ReplayArgs) -> Result<(), Box<dyn Error>> {
+/// Exit code 1 if something was not as the scenario expects it.
+pub fn run(arguments: &ReplayArgs) -> Result<ExitCode, Box<dyn Error>> {
     tracing_subscriber::fmt().with_max_level(bevy::log::Level::WARN).with_writer(std::io::stderr).init();
+    match arguments.files.as_slice() {
+        [file] if !arguments.is_batch() => run_one(file, arguments),
+        _ => batch::run(arguments).map(|()| ExitCode::SUCCESS),
+    }
+}
+
+fn run_one(file: &Path, arguments: &ReplayArgs) -> Result<ExitCode, Box<dyn Error>> {
+    if arguments.end_with_input {
+        batch::end_with_input();
+    }
     let options = ReplayOptions {
         out: arguments.out.clone(),
         fps: arguments.fps,
@@ -21,7 +35,10 @@ pub fn run(arguments: &ReplayArgs) -> Result<(), Box<dyn Error>> {
         render: !arguments.no_render,
         resume: arguments.resume.clone(),
         save: arguments.save_state.clone(),
-        ..ReplayOptions::new(Scenario::load(&arguments.file)?)
+        every: arguments.every,
+        video: arguments.video,
+        sheet: arguments.sheet,
+        ..ReplayOptions::new(Scenario::load_variant(file, arguments.variant.as_deref())?)
     };
     let bar = ProgressBar::no_length().with_style(
         ProgressStyle::with_template("{bar:40} tick {pos}/{len}, {elapsed} gone, {eta} to go")
@@ -40,5 +57,20 @@ pub fn run(arguments: &ReplayArgs) -> Result<(), Box<dyn Error>> {
         }
         None => println!("{}", serde_json::to_string_pretty(&report)?),
     }
-    Ok(())
+    for outcome in report.failed() {
+        eprintln!("not as expected: {}", describe(outcome));
+    }
+    Ok(if report.failed().next().is_none() { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+/// An expectation and what came of it, in a line.
+fn describe(outcome: &ExpectationOutcome) -> String {
+    let ExpectationOutcome { event, at, expectation, value, .. } = outcome;
+    let Expectation { quantity, surface, above, below } = expectation;
+    let of = surface.as_ref().map(|name| format!(" of {name}")).unwrap_or_default();
+    let bound = |word: &str, bound: &Option<f64>| bound.map(|bound| format!("{word} {bound}"));
+    let bounds: Vec<_> = [bound("above", above), bound("below", below)].into_iter().flatten().collect();
+    let value = value.map_or_else(|| "not measured".to_owned(), |value| value.to_string());
+    let bounds = bounds.join(" and ");
+    format!("events[{event}] at {at} s: {quantity:?}{of} is {value}, but should be {bounds}")
 }

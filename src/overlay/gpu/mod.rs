@@ -1,10 +1,10 @@
 //! Painting splats on the GPU: one compute pass before the cameras draw.
 //!
-//! Main world: every surface gets textures and buffers ([`Overlays`]). Extract moves the waiting splats over
-//! (each exactly once, however many ticks the frame held). Prepare sorts them into tiles and uploads them; until
-//! the pipeline and the maps exist, they wait. The pass dispatches one workgroup per touched tile: a surface
-//! without new splats costs nothing, which [`SplatStats`] shows. Then the touched tiles are halved into the mip maps of the
-//! colour maps (`mips.rs`).
+//! Main world: every surface gets textures and buffers ([`Overlays`]), of full size once something is to be painted. Extract
+//! moves the waiting splats over (each exactly once, however many ticks the frame held). Prepare sorts them into tiles and
+//! uploads them; until the pipeline and the maps exist, they wait. The pass dispatches one workgroup per touched tile: a
+//! surface without new splats costs nothing, which [`SplatStats`] shows. Then the touched tiles are halved into the mip maps of
+//! the colour maps (`mips.rs`).
 
 mod maps;
 mod mips;
@@ -18,8 +18,8 @@ use bevy::render::renderer::RenderGraph;
 use bevy::render::{ExtractSchedule, Render, RenderApp, RenderStartup, RenderSystems};
 use bevy::shader::load_shader_library;
 
-use super::SplatQueue;
 use super::deposit::note_traces;
+use super::{SizeMaps, SplatQueue};
 
 pub use maps::Overlays;
 pub use mips::MipStep;
@@ -41,7 +41,11 @@ impl Plugin for GpuOverlayPlugin {
         embedded_asset!(app, "../../../shaders/mips.wgsl");
 
         let stats = SplatStats::default();
-        app.insert_resource(stats.clone()).add_systems(PreUpdate, maps::add_overlays);
+        app.insert_resource(stats.clone()).add_observer(maps::release_overlays).add_systems(
+            PreUpdate,
+            // Of maps whose size has been decided; what has waited since the last tick gets its room at once.
+            (maps::add_overlays, maps::open_overlays).chain().after(SizeMaps),
+        );
 
         let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
         render_app

@@ -42,6 +42,7 @@ struct Counters {
     splats: AtomicU64,
     dispatches: AtomicU64,
     tiles: AtomicU64,
+    dropped: AtomicU64,
 }
 
 impl SplatStats {
@@ -58,6 +59,15 @@ impl SplatStats {
     /// Tiles visited.
     pub fn tiles(&self) -> u64 {
         self.0.tiles.load(Ordering::Relaxed)
+    }
+
+    /// Splats that were dropped with the maps they were meant for.
+    pub fn dropped(&self) -> u64 {
+        self.0.dropped.load(Ordering::Relaxed)
+    }
+
+    fn drop_splats(&self, splats: usize) {
+        self.0.dropped.fetch_add(splats as u64, Ordering::Relaxed);
     }
 
     fn add(&self, splats: usize, tiles: usize) {
@@ -110,6 +120,7 @@ impl From<&Overlays> for Maps {
 pub(super) fn extract_splats(
     mut main_world: ResMut<MainWorld>,
     mut pending: ResMut<PendingSplats>,
+    stats: Res<SplatStats>,
     mut query: Local<
         Option<
             QueryState<(Entity, &'static Overlays, &'static mut SplatQueue, Option<&'static SurfaceFrames>)>,
@@ -125,7 +136,8 @@ pub(super) fn extract_splats(
         {
             surfaces[index].levels = None;
         }
-        if queue.is_empty() {
+        // Splats for which there is no room yet wait where they are.
+        if queue.is_empty() || !overlays.has_colors {
             continue;
         }
         let index = *by_entity.entry(entity).or_insert_with(|| {
@@ -144,6 +156,7 @@ pub(super) fn extract_splats(
         let waiting = &mut surfaces[index];
         if waiting.maps.rings != overlays.rings.id() {
             // New maps: what was meant for the old ones is gone with them.
+            stats.drop_splats(waiting.splats.len());
             waiting.splats.clear();
         }
         waiting.maps = overlays.into();
@@ -154,9 +167,16 @@ pub(super) fn extract_splats(
         }
         queue.drain_into(&mut waiting.splats);
     }
-    let gone = |waiting: &PendingSurface| main_world.get_entity(waiting.entity).is_err();
+    // Despawned, or without maps; what is kept here for it goes, too.
+    let gone = |waiting: &PendingSurface| main_world.get::<Overlays>(waiting.entity).is_none();
     if surfaces.iter().any(gone) {
-        surfaces.retain(|waiting| !gone(waiting));
+        surfaces.retain(|waiting| {
+            let gone = gone(waiting);
+            if gone {
+                stats.drop_splats(waiting.splats.len());
+            }
+            !gone
+        });
         by_entity.clear();
         by_entity.extend(surfaces.iter().enumerate().map(|(index, waiting)| (waiting.entity, index)));
     }
@@ -348,11 +368,13 @@ mod tests {
             matter: default(),
             has_matter_room: false,
             rings: default(),
+            has_colors: true,
         };
         let surface = main.spawn((overlays, SplatQueue::default())).id();
         let mut render = World::new();
         render.insert_resource(main);
         render.init_resource::<PendingSplats>();
+        render.init_resource::<SplatStats>();
         (render, surface)
     }
 
@@ -394,6 +416,7 @@ mod tests {
         push(&mut render, surface, 3..4);
         schedule.run(&mut render);
         assert_eq!(pending(&render), [3]);
+        assert_eq!(render.resource::<SplatStats>().dropped(), 3);
     }
 
     #[test]

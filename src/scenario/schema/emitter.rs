@@ -1,12 +1,13 @@
 //! What makes it wet.
 
 use bevy::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::emitter::{EmitterShape, Flow, nozzle_speed};
 
 /// An emitter that moves along its keys.
-#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct EmitterSpec {
     /// For messages.
@@ -55,14 +56,16 @@ fn default_lifetime() -> f32 {
 }
 
 /// Where an emitter is at a time.
-#[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct EmitterKey {
     /// Seconds.
     #[serde(default)]
     pub t: f32,
     /// Its position.
+    #[schemars(with = "[f32; 3]")]
     pub position: Vec3,
     /// What it aims at.
+    #[schemars(with = "[f32; 3]")]
     pub target: Vec3,
 }

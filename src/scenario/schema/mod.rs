@@ -1,16 +1,23 @@
-//! What a scenario file may say. Every struct refuses fields it does not know.
+//! What a scenario file may say: a [`ScenarioPart`], which with all that it includes makes a [`Scenario`]. Every struct
+//! refuses fields it does not know.
 
 mod emitter;
+mod part;
 mod surface;
 
 use std::collections::BTreeMap;
 
 use bevy::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::EventSpec;
+use crate::overlay::MapBudget;
 use crate::weather::Weather;
 
 pub use emitter::{EmitterKey, EmitterSpec};
+pub(in crate::scenario) use part::replace;
+pub use part::{EmitterChange, ScenarioPart, WeatherPart};
 pub use surface::{MaterialSpec, MeshSpec, SurfaceSpec, SurfaceTextureSpec, TextureSpec, WetMapSpec};
 
 /// A scene and what happens in it. Lengths in metres, angles in degrees, time in seconds.
@@ -37,6 +44,9 @@ pub struct Scenario {
     /// The most particles in flight, up to [`Self::MAX_PARTICLES`].
     #[serde(default = "default_max_particles")]
     pub max_particles: u32,
+    /// What the maps of all surfaces may take, and how fine they are; left out, it is the app's to say.
+    #[serde(default)]
+    pub map_budget: Option<MapBudgetSpec>,
     /// Where it is seen from.
     pub camera: CameraSpec,
     /// The one light with shadows.
@@ -52,6 +62,9 @@ pub struct Scenario {
     /// What makes it wet, at most [`Self::MAX_EMITTERS`].
     #[serde(default)]
     pub emitters: Vec<EmitterSpec>,
+    /// What happens when, at most [`Self::MAX_EVENTS`]. In any order; of those at the same time the first comes first.
+    #[serde(default)]
+    pub events: Vec<EventSpec>,
 }
 
 impl Scenario {
@@ -63,10 +76,17 @@ impl Scenario {
     pub const MAX_SURFACES: usize = 10_000;
     /// The most emitters.
     pub const MAX_EMITTERS: usize = 4096;
+    /// The most events.
+    pub const MAX_EVENTS: usize = 10_000;
     /// The most particles an emitter sends per second.
     pub const MAX_RATE: f32 = 10_000_000.0;
     /// The most triangles of a generated mesh.
     pub const MAX_TRIANGLES: u64 = 20_000_000;
+}
+
+/// The JSON Schema of scenario files. RON's `Kind(field: 1)` is `{"Kind": {"field": 1}}` there, `(field: 1)` an object.
+pub fn schema_json() -> serde_json::Value {
+    schemars::schema_for!(ScenarioPart).into()
 }
 
 fn default_hz() -> u32 {
@@ -82,7 +102,7 @@ fn default_max_particles() -> u32 {
 }
 
 /// A camera that moves along its keys.
-#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct CameraSpec {
     /// Vertical field of view.
@@ -104,23 +124,26 @@ fn default_ev100() -> f32 {
 }
 
 /// Where the camera is at a time.
-#[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct CameraKey {
     /// Seconds.
     #[serde(default)]
     pub t: f32,
     /// Position of the eye.
+    #[schemars(with = "[f32; 3]")]
     pub eye: Vec3,
     /// What it looks at.
+    #[schemars(with = "[f32; 3]")]
     pub target: Vec3,
 }
 
 /// The sun.
-#[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct SunSpec {
     /// Where it shines to.
+    #[schemars(with = "[f32; 3]")]
     pub direction: Vec3,
     /// Lux.
     pub illuminance: f32,
@@ -171,8 +194,42 @@ impl Scenario {
     }
 }
 
+/// What the maps of all surfaces may take; see [`MapBudget`].
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct MapBudgetSpec {
+    /// MiB on the GPU, above 0 up to [`Self::MAX_MIB`].
+    pub mib: f32,
+    /// Width of a texel in the world, mm, above 0 up to [`Self::MAX_TEXEL_MM`]; maps are as large as their surfaces say if
+    /// left out.
+    pub texel_mm: Option<f32>,
+}
+
+impl MapBudgetSpec {
+    /// The largest budget: 64 GiB.
+    pub const MAX_MIB: f32 = 65_536.0;
+    /// The widest texel.
+    pub const MAX_TEXEL_MM: f32 = 10_000.0;
+}
+
+impl Default for MapBudgetSpec {
+    fn default() -> Self {
+        let MapBudget { bytes, texel } = MapBudget::default();
+        Self { mib: bytes as f32 / (1u32 << 20) as f32, texel_mm: texel.map(|texel| texel * 1000.0) }
+    }
+}
+
+impl Scenario {
+    /// The budget of the run, if the file has one.
+    pub fn map_budget(&self) -> Option<MapBudget> {
+        let MapBudgetSpec { mib, texel_mm } = self.map_budget?;
+        let bytes = (f64::from(mib) * f64::from(1u32 << 20)) as u64;
+        Some(MapBudget { bytes, texel: texel_mm.map(|mm| mm / 1000.0) })
+    }
+}
+
 /// A photograph of everything around.
-#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct EnvironmentSpec {
     /// Equirectangular `.exr`.

@@ -1,6 +1,7 @@
 //! What can get wet: materials, meshes, maps.
 
 use bevy::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::material::{PorousMaterial, StandingWater};
@@ -8,7 +9,7 @@ use crate::overlay::Weatherable;
 use crate::scenes::stone::Stone;
 
 /// How a surface looks dry and takes up water.
-#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct MaterialSpec {
     /// Linear RGB; multiplies the texture.
@@ -16,6 +17,7 @@ pub struct MaterialSpec {
     /// Colour, normal and roughness maps.
     pub texture: TextureSpec,
     /// Repeats of the texture over the uv square.
+    #[schemars(with = "[f32; 2]")]
     pub tiles: Vec2,
     /// Perceptual roughness; multiplies the texture's.
     pub roughness: f32,
@@ -57,7 +59,7 @@ impl Default for MaterialSpec {
 }
 
 /// Where the maps of a material come from.
-#[derive(Serialize, Deserialize, Debug, Clone, PartialEq, Default)]
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, PartialEq, Default)]
 pub enum TextureSpec {
     /// No maps.
     #[default]
@@ -76,7 +78,7 @@ pub enum TextureSpec {
 }
 
 /// Where porosity (red) and height (green) of a material come from.
-#[derive(Serialize, Deserialize, Debug, Clone, PartialEq, Default)]
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, PartialEq, Default)]
 pub enum SurfaceTextureSpec {
     /// The same everywhere: as porous as can be, and on top.
     #[default]
@@ -88,7 +90,7 @@ pub enum SurfaceTextureSpec {
 }
 
 /// A mesh that can get wet.
-#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct SurfaceSpec {
     /// Unique; names its maps and its row in the report.
@@ -99,12 +101,15 @@ pub struct SurfaceSpec {
     pub material: String,
     /// Position of its origin.
     #[serde(default)]
+    #[schemars(with = "[f32; 3]")]
     pub position: Vec3,
     /// Turns around Y, then X, then Z.
     #[serde(default)]
+    #[schemars(with = "[f32; 3]")]
     pub rotation_deg: Vec3,
     /// Per axis, not 0.
     #[serde(default = "default_scale")]
+    #[schemars(with = "[f32; 3]")]
     pub scale: Vec3,
     /// Its maps.
     #[serde(default)]
@@ -115,7 +120,7 @@ pub struct SurfaceSpec {
 }
 
 /// A wet map that is played; see [`PlayedWetMap`](crate::material::PlayedWetMap).
-#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct WetMapSpec {
     /// `.png`, as `weathering wetmap` makes them.
@@ -154,13 +159,15 @@ fn default_scale() -> Vec3 {
 }
 
 /// Where a mesh comes from.
-#[derive(Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, PartialEq)]
 pub enum MeshSpec {
     /// A horizontal grid: 2 · cells.x · cells.y triangles.
     Ground {
         /// Along x and z.
+        #[schemars(with = "[f32; 2]")]
         size: Vec2,
         /// Along x and z.
+        #[schemars(with = "[u32; 2]")]
         cells: UVec2,
     },
     /// Sectors around, stacks from pole to pole.
@@ -204,8 +211,10 @@ pub enum MeshSpec {
     /// A horizontal grid like `Ground` that knows in its vertex colours where puddles form.
     Road {
         /// Along x and z.
+        #[schemars(with = "[f32; 2]")]
         size: Vec2,
         /// Along x and z.
+        #[schemars(with = "[u32; 2]")]
         cells: UVec2,
         /// Another one, other basins.
         seed: u32,
@@ -213,17 +222,21 @@ pub enum MeshSpec {
     /// A cloth that hangs above its origin in folds and faces +z: 2 · cells.x · cells.y triangles.
     Cloth {
         /// Along x and y.
+        #[schemars(with = "[f32; 2]")]
         size: Vec2,
         /// Along x and y.
+        #[schemars(with = "[u32; 2]")]
         cells: UVec2,
     },
     /// An upright carved stone plate that faces +z, its lower edge at the origin.
     BasRelief {
         /// Along x and y.
+        #[schemars(with = "[f32; 2]")]
         size: Vec2,
         /// Of the carving, metres.
         depth: f32,
         /// Along x and y, over the front.
+        #[schemars(with = "[u32; 2]")]
         cells: UVec2,
         /// Another one, other wear.
         seed: u32,
@@ -241,6 +254,7 @@ pub enum MeshSpec {
         /// How deep the treads are worn, metres.
         hollow: f32,
         /// Across the width and along a tread.
+        #[schemars(with = "[u32; 2]")]
         cells: UVec2,
         /// Another one, worn elsewhere.
         seed: u32,
@@ -248,10 +262,12 @@ pub enum MeshSpec {
     /// A slope of tiles that goes down towards +z.
     Roof {
         /// Along x and down the slope.
+        #[schemars(with = "[f32; 2]")]
         size: Vec2,
         /// Slope.
         pitch_deg: f32,
         /// Along x and down the slope.
+        #[schemars(with = "[u32; 2]")]
         tiles: UVec2,
         /// Across a tile and along it.
         cells: u32,

@@ -28,6 +28,7 @@ use bevy::asset::RenderAssetUsages;
 use bevy::math::{DVec3, Vec2, Vec3};
 use bevy::prelude::Image;
 use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::mips::{MipContent, mip_chain, srgb_from_linear, tiling_sampler, unorm8};
@@ -38,7 +39,7 @@ use noise::Layers;
 use relief::{normals, occlusion, span_mm};
 
 /// A kind of stone, or of ground or cloth.
-#[derive(Serialize, Deserialize, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Serialize, Deserialize, JsonSchema, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stone {
     /// Fired clay from the wheel: fine, mottled, turning marks along u, specks of temper, a few scratches.
     Terracotta,

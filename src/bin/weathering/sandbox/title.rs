@@ -1,19 +1,17 @@
-//! The window's title says which scenario it is and whether it loads, runs or stands still.
+//! The window's title says which scene it is and whether it loads, runs or stands still.
 
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_weathering::scenario::ScenarioStatus;
 
-/// Name of what is shown.
-#[derive(Resource)]
-pub struct ScenarioName(pub String);
+use super::open::Opened;
 
 pub fn plugin(app: &mut App) {
     app.add_systems(PostUpdate, name_window);
 }
 
 fn name_window(
-    name: Res<ScenarioName>,
+    opened: Res<Opened>,
     status: Res<ScenarioStatus>,
     time: Res<Time<Virtual>>,
     mut window: Single<&mut Window, With<PrimaryWindow>>,
@@ -25,7 +23,7 @@ fn name_window(
         ScenarioStatus::Failed(_) => "failed",
         ScenarioStatus::Loading => "loading",
     };
-    if shown.replace(state) != Some(state) {
-        window.title = format!("weathering - {} ({state})", name.0);
+    if shown.replace(state) != Some(state) || opened.is_changed() {
+        window.title = format!("weathering - {} ({state})", opened.loaded.file.display());
     }
 }
