@@ -75,7 +75,7 @@ impl Document {
         if sparse.is_object() {
             let some = number(&sparse["count"]).filter(|&some| some <= count);
             let some = some.ok_or("has a sparse part without a `count` that fits")?;
-            let part = |name: &str, size: usize| {
+            let part = |name: &str, size: usize| -> Result<Vec<u8>, String> {
                 let part = &sparse[name];
                 let view = number(&part["bufferView"]).ok_or("has a sparse part without a `bufferView`")?;
                 self.strided(view, number(&part["byteOffset"]).unwrap_or(0), size, some)

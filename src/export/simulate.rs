@@ -77,7 +77,7 @@ pub(super) fn simulate(
 ) -> Result<Outcome, ExportError> {
     let assets = AssetPlugin { watch_for_changes_override: Some(false), ..default() };
     let mut app = headless(task_pools(options.threads), assets);
-    ClockPlugin { hz: options.tick_hz }.insert_clock(&mut app);
+    ClockPlugin { hz: options.tick_hz }.insert_clock(app.world_mut());
     app.insert_resource(EmissionSeed(options.seed)).insert_resource(options.weather);
     // Nothing goes to a GPU, and how many texels there may be has been looked at.
     app.insert_resource(MapBudget { bytes: 1 << 50, texel: None });
