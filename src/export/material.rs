@@ -16,9 +16,9 @@ use crate::replay::SurfaceMaps;
 /// Numbers of textures: colour, roughness and metallic, normal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct WetTextures {
-    color: usize,
-    surface: usize,
-    normal: Option<usize>,
+    pub(super) color: usize,
+    pub(super) surface: usize,
+    pub(super) normal: Option<usize>,
 }
 
 impl Document {

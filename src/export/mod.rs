@@ -29,6 +29,7 @@ mod look;
 mod material;
 mod options;
 mod paint;
+mod rain;
 mod raster;
 mod report;
 mod scene;

@@ -10,32 +10,24 @@ use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 
 use super::look::Held;
+use super::rain::{add_rain, bounds};
 use super::{ExportError, ExportOptions};
 use crate::clock::{ClockPlugin, WeatheringClock};
 use crate::collision::{ColliderReport, MeshColliders, NotWeatherable, SurfaceCollider, TriangleError};
-use crate::effect::drops::DropSizes;
-use crate::effect::{EffectTable, WeatherEffect};
-use crate::emitter::{EmissionSeed, Emitter, EmitterShape, Flow};
+use crate::emitter::EmissionSeed;
 use crate::material::PorousMaterial;
 use crate::matter::snow::RELATIVE_DENSITY;
 use crate::matter::{SurfaceMatter, TexelMatter};
 use crate::overlay::{
     CpuMaps, FramesWork, MapBudget, MapLoss, OverlayUv, SurfaceTotals, TexelArea, Weatherable,
 };
-use crate::particle::{Lifespan, ParticleCounts};
+use crate::particle::ParticleCounts;
 use crate::replay::{Progress, SurfaceMaps, WaterReport, headless, task_pools, water_of};
 use crate::weather::DryingClock;
 use crate::wetting::{Exposure, ExposureProgress, Now, SurfaceWater, WetGeometry};
 
 /// Seconds of wall-clock time after which surfaces that are not ready are given up.
 const PATIENCE_SECONDS: u64 = 600;
-/// Rain begins so high above the scene, metres; with wind so much more, that it is on its way with it when it arrives.
-const ABOVE: f32 = 1.0;
-const GUST_RUN: f32 = 4.0;
-/// Slow drops of rain fall no slower than this, m/s.
-const SLOWEST: f32 = 3.0;
-/// The most particles that are sent out a second, for a sky much larger than the scene.
-const MOST_PER_SECOND: f32 = 100_000.0;
 
 /// One surface, ready to be rained on.
 pub(super) struct Exposed {
@@ -100,7 +92,7 @@ pub(super) fn simulate(
         ));
     }
     wait_until_ready(&mut app, failed)?;
-    add_rain(app.world_mut(), bounds(exposed), options);
+    add_rain(app.world_mut(), bounds(exposed.iter().map(|surface| &surface.mesh)), options);
 
     let ticks = options.ticks();
     let mut tick = 0;
@@ -123,7 +115,7 @@ fn run(app: &mut App, ticks: u32) {
     app.update();
 }
 
-type Unready = Or<(Without<SurfaceCollider>, Without<TexelArea>, Without<Exposure>)>;
+type Unready = Or<(Without<SurfaceCollider>, Without<TexelArea>, Without<SurfaceWater>, Without<Exposure>)>;
 
 fn wait_until_ready(
     app: &mut App,
@@ -151,56 +143,6 @@ fn wait_until_ready(
         // Measuring goes on in other threads.
         std::thread::sleep(Duration::from_millis(1));
     }
-}
-
-/// Lowest and highest corner of all surfaces.
-fn bounds(exposed: &[Exposed]) -> (Vec3, Vec3) {
-    let positions = exposed.iter().filter_map(|surface| {
-        surface.mesh.attribute(Mesh::ATTRIBUTE_POSITION).and_then(|positions| positions.as_float3())
-    });
-    let points = positions.flatten().copied().map(Vec3::from_array).filter(|point| point.is_finite());
-    let all = points.fold(None, |bounds: Option<(Vec3, Vec3)>, point| {
-        let (low, high) = bounds.unwrap_or((point, point));
-        Some((low.min(point), high.max(point)))
-    });
-    all.unwrap_or((Vec3::ZERO, Vec3::ZERO))
-}
-
-/// A sky over all of the scene, and over whatever the wind blows onto it.
-fn add_rain(world: &mut World, (low, high): (Vec3, Vec3), options: &ExportOptions) {
-    let mut effect = options.effect.clone();
-    if let DropSizes::MarshallPalmer(_) = effect.drops {
-        effect.drops = DropSizes::MarshallPalmer(options.rain_mm_per_h.clamp(0.1, 300.0));
-    }
-    let wind = Vec2::new(options.weather.wind.x, options.weather.wind.z);
-    let above = if wind == Vec2::ZERO { ABOVE } else { ABOVE + GUST_RUN };
-    let fall_seconds = (high.y - low.y + above) / SLOWEST;
-    // Drops that are born up the wind are carried over the scene.
-    let drift = -wind * fall_seconds;
-    let (low_xz, high_xz) = (Vec2::new(low.x, low.z), Vec2::new(high.x, high.z));
-    // Marks reach beyond what is hit, and a wall has no width.
-    let margin = Vec2::splat(0.25);
-    let (from, to) = (low_xz + drift.min(Vec2::ZERO) - margin, high_xz + drift.max(Vec2::ZERO) + margin);
-    let (half_size, own) = ((to - from) / 2.0, (high_xz - low_xz) / 2.0 + margin);
-    let middle = (from + to) / 2.0;
-    let crowd = half_size.element_product() / own.element_product();
-    let longest = f32::from(Lifespan::MAX_TICKS) / options.tick_hz as f32;
-    let handle = world.resource_mut::<Assets<WeatherEffect>>().add(effect.clone());
-    world.resource_mut::<EffectTable>().insert(handle.clone(), effect);
-    world.spawn((
-        Name::new("rain"),
-        Emitter {
-            effect: handle,
-            rate: (options.particles_per_second * crowd).min(MOST_PER_SECOND),
-            shape: EmitterShape::Sky { half_size },
-            flow: Flow::MmPerHour(options.rain_mm_per_h),
-            speed: 0.0,
-            lifetime: (2.0 * fall_seconds + 1.0).min(longest),
-            ..default()
-        },
-        Transform::from_xyz(middle.x, high.y + above, middle.y),
-        GlobalTransform::from_xyz(middle.x, high.y + above, middle.y),
-    ));
 }
 
 /// What has become of the surfaces, in their order.
@@ -273,27 +215,4 @@ fn held(
         held
     };
     (0..size * size).map(one).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_sky_reaches_over_what_the_wind_blows_in() {
-        let mut app =
-            headless(task_pools(None), AssetPlugin { watch_for_changes_override: Some(false), ..default() });
-        let mut options = ExportOptions::default();
-        options.weather.wind = Vec3::new(3.0, 0.0, 0.0);
-        add_rain(app.world_mut(), (Vec3::ZERO, Vec3::new(2.0, 1.0, 2.0)), &options);
-        let world = app.world_mut();
-        let mut query = world.query::<(&Emitter, &Transform)>();
-        let (emitter, transform) = query.single(world).unwrap();
-        let EmitterShape::Sky { half_size } = emitter.shape else { panic!("{:?}", emitter.shape) };
-        let (west, east) = (transform.translation.x - half_size.x, transform.translation.x + half_size.x);
-        // Six metres of fall at the slowest take two seconds.
-        assert!((west + 6.25).abs() < 1e-4 && (east - 2.25).abs() < 1e-4, "{west} {east}");
-        assert!((transform.translation.z - 1.0).abs() < 1e-4);
-        assert!(emitter.rate > options.particles_per_second * 3.0);
-    }
 }

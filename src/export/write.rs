@@ -82,6 +82,7 @@ impl Writer {
             Some(_) => Some(self.cut_attributes(place, shape)?),
             None => None,
         };
+        let keeps_tangents = textures.normal.is_none() || self.normal_set(dry) == set;
         let mesh = self.mesh_of(place);
         let primitive = &mut self.document.json["meshes"][mesh]["primitives"][place.primitive];
         let Some(fields) = primitive.as_object_mut() else { return Ok(()) };
@@ -91,6 +92,8 @@ impl Writer {
             }
             fields.insert("indices".into(), corners.into());
             fields.insert("mode".into(), 4.into());
+        } else if !keeps_tangents {
+            forget_tangents(fields);
         }
         fields.insert("material".into(), wet.into());
         let [dry_variant, wet_variant] = self.variants;
@@ -166,6 +169,12 @@ impl Writer {
         Ok((changed, corners))
     }
 
+    /// The uvs for which a primitive with this material has tangents, if it has any.
+    fn normal_set(&self, material: usize) -> usize {
+        let material = self.document.list("materials").get(material).unwrap_or(&Value::Null);
+        number(&material["normalTexture"]["texCoord"]).unwrap_or(0)
+    }
+
     /// Whether any dry material that a primitive may show has a normal map.
     fn has_dry_normals(&self, primitive: &Value) -> bool {
         let mappings = primitive["extensions"][VARIANTS]["mappings"].as_array().into_iter().flatten();
@@ -176,6 +185,17 @@ impl Writer {
             let coat = &material["extensions"]["KHR_materials_clearcoat"]["clearcoatNormalTexture"];
             material["normalTexture"].is_object() || coat.is_object()
         })
+    }
+}
+
+/// Takes tangents out of a primitive: a reader makes them for the uvs of each normal map.
+fn forget_tangents(primitive: &mut Map<String, Value>) {
+    let targets = primitive.get_mut("targets").and_then(Value::as_array_mut);
+    for target in targets.into_iter().flatten().filter_map(Value::as_object_mut) {
+        target.remove("TANGENT");
+    }
+    if let Some(attributes) = primitive.get_mut("attributes").and_then(Value::as_object_mut) {
+        attributes.remove("TANGENT");
     }
 }
 
@@ -224,4 +244,49 @@ fn list<'v>(parent: &'v mut Map<String, Value>, key: &str) -> Option<&'v mut Vec
         *field = json!([]);
     }
     field.as_array_mut()
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::math::Affine3A;
+
+    use super::*;
+    use crate::export::shape::tests::square;
+
+    fn place(node: usize) -> Place {
+        let name = format!("place{node}");
+        Place { name, node, mesh: 0, primitive: 0, world_from_mesh: Affine3A::IDENTITY }
+    }
+
+    #[test]
+    fn what_gets_no_rain_keeps_its_mesh_and_tangents_that_do_not_fit_go() {
+        let json = json!({
+            "nodes": [{ "mesh": 0 }, { "mesh": 0 }, { "mesh": 0 }],
+            "materials": [{ "normalTexture": { "index": 0, "texCoord": 1 } }],
+            "meshes": [{ "name": "slab", "primitives": [{
+                "attributes": { "POSITION": 0, "TANGENT": 1 },
+                "targets": [{ "POSITION": 2, "TANGENT": 3 }],
+                "material": 0,
+            }] }],
+        });
+        let document = Document { path: "scene.glb".into(), json, bytes: Vec::new() };
+        let before = document.list("meshes")[0].clone();
+        let places = [place(0), place(2)];
+        let mut writer = Writer::new(document, &[&places[0], &places[1]]);
+        let textures = |normal| WetTextures { color: 4, surface: 5, normal };
+        // Maps lie over the first uvs, but the tangents are those of the second.
+        writer.add(&places[0], &square(1.0), textures(Some(6)), json!({})).unwrap();
+        writer.add(&places[1], &square(1.0), textures(None), json!({})).unwrap();
+        let (nodes, meshes) = (writer.document.list("nodes"), writer.document.list("meshes"));
+        assert_eq!(
+            (&nodes[0]["mesh"], &nodes[1]["mesh"], &nodes[2]["mesh"]),
+            (&json!(1), &json!(0), &json!(2))
+        );
+        assert_eq!((meshes.len(), &meshes[0], &meshes[1]["name"]), (3, &before, &json!("slab_node0")));
+        let primitive = |mesh: usize| &meshes[mesh]["primitives"][0];
+        assert_eq!(primitive(1)["attributes"], json!({ "POSITION": 0 }));
+        assert_eq!(primitive(1)["targets"], json!([{ "POSITION": 2 }]));
+        assert_eq!(primitive(2)["attributes"], before["primitives"][0]["attributes"]);
+        assert_eq!((&primitive(1)["material"], &primitive(2)["material"]), (&json!(1), &json!(2)));
+    }
 }
