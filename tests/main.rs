@@ -6,6 +6,13 @@
 mod collision;
 /// Random numbers and meshes for the other modules.
 mod common;
+/// Scenes with the weathering baked in.
+mod export {
+    mod bake;
+    /// The rules of the format.
+    mod rules;
+    mod scene;
+}
 /// The real shaders on a real driver, against their twins.
 mod gpu {
     /// Small apps that render without a window.

@@ -57,12 +57,13 @@ pub fn task_pools(threads: Option<usize>) -> TaskPoolPlugin {
 
 /// An app that runs when told to.
 pub(super) fn build(options: &ReplayOptions, scenario: ScenarioPlugin) -> App {
-    let mut app = App::new();
+    let mut app;
     let tasks = task_pools(options.threads);
     let assets = AssetPlugin { file_path: options.scenario.tree.to_string_lossy().into_owned(), ..default() };
     if options.render {
         let no_window =
             WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
+        app = App::new();
         app.add_plugins(
             DefaultPlugins
                 .set(tasks)
@@ -80,26 +81,33 @@ pub(super) fn build(options: &ReplayOptions, scenario: ScenarioPlugin) -> App {
         .insert_resource(options.splat_budget)
         .add_plugins(WeatheringPlugins);
     } else {
-        app.add_plugins(MinimalPlugins.set(tasks))
-            .add_plugins((
-                TransformPlugin,
-                assets,
-                WorldSerializationPlugin,
-                ImagePlugin::default(),
-                MeshPlugin,
-                GltfPlugin::default(),
-            ))
-            // Nothing is drawn: no compressed texture is needed.
-            .insert_resource(CompressedImageFormatSupport(CompressedImageFormats::NONE))
-            .init_asset::<AnimationClip>()
-            .add_plugins(WeatheringPlugins.build().disable::<GpuOverlayPlugin>())
-            .add_plugins(CpuOverlayPlugin);
+        app = headless(tasks, assets);
     }
     app.add_plugins(scenario);
     // A frame may be as long as it likes.
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(std::time::Duration::from_secs(86_400));
     app.finish();
     app.cleanup();
+    app
+}
+
+/// An app with no renderer, which paints on the CPU. It has not been finished yet.
+pub(crate) fn headless(tasks: TaskPoolPlugin, assets: AssetPlugin) -> App {
+    let mut app = App::new();
+    app.add_plugins(MinimalPlugins.set(tasks))
+        .add_plugins((
+            TransformPlugin,
+            assets,
+            WorldSerializationPlugin,
+            ImagePlugin::default(),
+            MeshPlugin,
+            GltfPlugin::default(),
+        ))
+        // Nothing is drawn: no compressed texture is needed.
+        .insert_resource(CompressedImageFormatSupport(CompressedImageFormats::NONE))
+        .init_asset::<AnimationClip>()
+        .add_plugins(WeatheringPlugins.build().disable::<GpuOverlayPlugin>())
+        .add_plugins(CpuOverlayPlugin);
     app
 }
 

@@ -58,6 +58,36 @@ pub(super) fn to_be_painted(world: &mut World) -> u64 {
 }
 
 impl SurfaceMaps {
+    /// Of a surface as it is now; without colour maps unless they are on the CPU.
+    pub(crate) fn new(
+        name: String,
+        size: u32,
+        water: &SurfaceWater,
+        matter: &SurfaceMatter,
+        loss: MapLoss,
+        cpu: Option<&CpuMaps>,
+        now: &Now,
+    ) -> Self {
+        let colors = |of: fn(&CpuMaps) -> &Vec<[u8; 4]>| {
+            cpu.map(|cpu| of(cpu).as_flattened().to_vec()).unwrap_or_default()
+        };
+        Self {
+            name,
+            size,
+            diffuse: colors(|cpu| &cpu.diffuse),
+            specular: colors(|cpu| &cpu.specular),
+            normal: colors(|cpu| &cpu.normal),
+            wetness: (0..size.pow(2)).map(|texel| wetness_of(water, now, texel)).collect(),
+            since: water.texels().iter().map(|texel| texel.tick).collect(),
+            wet_fraction: f64::from(summary(water, now).wet_fraction),
+            water: water.clone(),
+            stock: water.stock(now),
+            matter: matter.clone(),
+            loss,
+            hz: now.hz,
+        }
+    }
+
     /// Of a surface that has none.
     fn none(name: String, surface: &Weatherable, loss: MapLoss, hz: u32) -> Self {
         Self {
@@ -110,27 +140,10 @@ impl Run<'_> {
             let size = size.texels();
             let material = material.unwrap_or(&default);
             let now = Now::new(clock.tick(), clock.hz(), &drying, &geometry.0, exposure, material);
-            let wetness = (0..size.pow(2)).map(|texel| wetness_of(water, &now, texel)).collect();
-            let mut read = SurfaceMaps {
-                name: surface.name.clone(),
-                size,
-                diffuse: vec![],
-                specular: vec![],
-                normal: vec![],
-                wetness,
-                since: water.texels().iter().map(|texel| texel.tick).collect(),
-                wet_fraction: f64::from(summary(water, &now).wet_fraction),
-                water: water.clone(),
-                stock: water.stock(&now),
-                matter: matter.clone(),
-                loss: *loss,
-                hz: clock.hz(),
-            };
-            if let Some(cpu) = cpu {
-                read.diffuse = cpu.diffuse.as_flattened().to_vec();
-                read.specular = cpu.specular.as_flattened().to_vec();
-                read.normal = cpu.normal.as_flattened().to_vec();
-            } else if let Some(gpu) = gpu.filter(|gpu| gpu.has_colors) {
+            let read = SurfaceMaps::new(surface.name.clone(), size, water, matter, *loss, cpu, &now);
+            if cpu.is_none()
+                && let Some(gpu) = gpu.filter(|gpu| gpu.has_colors)
+            {
                 requests.push((entity, 0, Readback::texture(gpu.diffuse.clone())));
                 requests.push((entity, 1, Readback::texture(gpu.specular.clone())));
                 requests.push((entity, 2, Readback::texture(gpu.normal.clone())));
@@ -211,7 +224,7 @@ pub(super) const MAP_NAMES: [&str; 7] =
 /// Writes `<surface>_<map>.png` for each map of the surfaces that have any: `diffuse`, `specular`, `normal` as they are;
 /// `film` and `absorbed` as 16-bit micrometres of water, `wetness` as 16-bit parts of full, `since` as 16-bit hundredths of
 /// a second of the reference time (0 is never). Values too large stop at 65,535.
-pub(super) fn write_maps(folder: &Path, surfaces: &[SurfaceMaps]) -> Result<(), ReplayError> {
+pub(crate) fn write_maps(folder: &Path, surfaces: &[SurfaceMaps]) -> Result<(), ReplayError> {
     for surface in surfaces.iter().filter(|surface| surface.size > 0) {
         let path = |map| folder.join(format!("{}_{map}.png", surface.name));
         let [diffuse, specular, normal, film, absorbed, wetness, since] = MAP_NAMES.map(path);

@@ -40,10 +40,13 @@ use crate::picture::PictureError;
 use crate::save::{ColorMaps, SaveError, SavedScene};
 use crate::scenario::{LoadedScenario, ScenarioError, ScenarioPlugin, ScenarioStatus, captures};
 
+pub(crate) use app::headless;
 pub use app::{require_adapter, task_pools};
 pub use capture::write_png;
 pub use files::{DONE_FILE, write_atomic};
+pub(crate) use maps::write_maps;
 pub use maps::{SurfaceMaps, without_padding};
+pub(crate) use report::water_of;
 pub use report::{ParticleReport, Report, SurfaceReport, Timing, WaterReport, WorkReport};
 use series::SeriesTables;
 

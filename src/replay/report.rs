@@ -312,3 +312,9 @@ pub(super) fn water_report(world: &World, maps: &[SurfaceAccounts]) -> WaterRepo
     }
     report
 }
+
+/// The water of a world whose surfaces are all among `maps`.
+pub(crate) fn water_of(world: &World, maps: &[SurfaceMaps]) -> WaterReport {
+    let accounts: Vec<_> = maps.iter().map(SurfaceMaps::accounts).collect();
+    water_report(world, &accounts)
+}

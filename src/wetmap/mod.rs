@@ -36,7 +36,7 @@ mod gutter;
 mod levels;
 mod mask;
 mod occlusion;
-mod parallel;
+pub(crate) mod parallel;
 mod perlin;
 mod photo;
 mod rays;

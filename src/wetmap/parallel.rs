@@ -5,7 +5,7 @@ use std::sync::Mutex;
 
 /// Calls `work(first, chunk)` for chunks of `values`, `first` being the index of the first value in the
 /// chunk. Which thread gets which chunk is left to chance, so `work` must only depend on the index.
-pub(super) fn fill<T: Send>(values: &mut [T], chunk: usize, work: impl Fn(usize, &mut [T]) + Sync) {
+pub(crate) fn fill<T: Send>(values: &mut [T], chunk: usize, work: impl Fn(usize, &mut [T]) + Sync) {
     fill_on(std::thread::available_parallelism().map_or(1, NonZero::get), values, chunk, work);
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::bake::BakeArgs;
 use crate::stamps::StampsArgs;
 use crate::wetmap::WetMapCommand;
 use bevy::math::UVec2;
@@ -25,6 +26,8 @@ pub enum Command {
     Schema,
     /// Open a scenario or a model in a window, to play with
     Sandbox(SandboxArgs),
+    /// Let it rain on a glTF scene, and bake what that leaves into its textures
+    Bake(BakeArgs),
     /// Make a wet map: what of a surface gets wet first
     #[command(subcommand)]
     Wetmap(WetMapCommand),

@@ -1,5 +1,6 @@
-//! `weathering`: replays scenarios to pictures and numbers, and opens them to play with.
+//! `weathering`: replays scenarios to pictures and numbers, opens them to play with, and bakes scenes.
 
+mod bake;
 mod batch;
 mod check;
 mod cli;
@@ -26,6 +27,7 @@ fn main() -> ExitCode {
         cli::Command::Schema => check::print_schema(),
         cli::Command::Sandbox(arguments) => done(sandbox::run(&arguments)),
         cli::Command::Wetmap(command) => done(wetmap::run(&command)),
+        cli::Command::Bake(arguments) => done(bake::run(&arguments)),
         cli::Command::Stamps(arguments) => done(stamps::run(&arguments)),
         cli::Command::WetTexture(arguments) => done(wet_texture::run(&arguments)),
     };

@@ -294,7 +294,7 @@ fn load_scene(file: &Path) -> Result<ExposureScene, Box<dyn Error>> {
 }
 
 /// `N` finite numbers with commas between them.
-fn numbers<const N: usize>(text: &str) -> Result<[f32; N], String> {
+pub fn numbers<const N: usize>(text: &str) -> Result<[f32; N], String> {
     let parse = |number: &str| match number.trim().parse::<f32>() {
         Ok(number) if number.is_finite() => Ok(number),
         Ok(number) => Err(format!("{number} is not finite")),

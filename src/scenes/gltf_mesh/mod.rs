@@ -20,7 +20,7 @@ use bevy::math::{Affine3A, Mat4};
 use bevy::mesh::Mesh;
 
 use self::file::GltfFile;
-pub(crate) use self::uri::{data_uri, percent_decoded};
+pub(crate) use self::uri::{data_uri, percent_decoded, read_capped, read_uri};
 use crate::collision::MeshTriangles;
 
 /// A mesh where it stands in its scene.

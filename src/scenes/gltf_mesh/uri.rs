@@ -8,7 +8,8 @@ use percent_encoding::percent_decode_str;
 
 use super::{GltfMeshError, MAX_FILE_BYTES};
 
-pub(super) fn read_capped(path: &Path) -> Result<Vec<u8>, GltfMeshError> {
+/// A file of at most [`MAX_FILE_BYTES`].
+pub(crate) fn read_capped(path: &Path) -> Result<Vec<u8>, GltfMeshError> {
     let read = |source| GltfMeshError::Read { path: path.into(), source };
     let size = std::fs::metadata(path).map_err(read)?.len();
     if size > MAX_FILE_BYTES {
@@ -18,7 +19,7 @@ pub(super) fn read_capped(path: &Path) -> Result<Vec<u8>, GltfMeshError> {
 }
 
 /// The bytes that a URI stands for.
-pub(super) fn read_uri(path: &Path, field: &str, uri: &str) -> Result<Vec<u8>, GltfMeshError> {
+pub(crate) fn read_uri(path: &Path, field: &str, uri: &str) -> Result<Vec<u8>, GltfMeshError> {
     let content = |reason: &str| GltfMeshError::Content {
         path: path.into(),
         field: field.into(),
