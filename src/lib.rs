@@ -6,6 +6,7 @@ pub mod clock;
 pub mod collision;
 pub mod effect;
 pub mod emitter;
+mod input;
 pub mod material;
 pub mod matter;
 pub mod output;

@@ -6,6 +6,10 @@
 mod collision;
 /// Random numbers and meshes for the other modules.
 mod common;
+/// What goes wrong around the program: it is killed, the disk is full, nothing can be drawn.
+mod faults;
+/// Ten thousand spoilt files.
+mod fuzz;
 /// The real shaders on a real driver, against their twins.
 mod gpu {
     /// Small apps that render without a window.

@@ -19,6 +19,7 @@ use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 
 use crate::clock::WeatheringClock;
+use crate::output::remove_temporaries;
 use crate::overlay::SurfaceTotals;
 use crate::picture::PictureError;
 use crate::save::{ColorMaps, SaveError, SavedScene};
@@ -172,6 +173,9 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
     }
     if let Some(out) = &options.out {
         files::require_writable(out)?;
+        for folder in [out.clone(), out.join("maps")] {
+            remove_temporaries(&folder).map_err(|source| ReplayError::Write { path: folder, source })?;
+        }
         let taken: Vec<_> = taken.iter().map(|(_, name)| files::capture_file(name)).collect();
         files::remove_earlier_run(out, frames.start, &taken)?;
     }
