@@ -31,7 +31,7 @@ impl LoadedScenario {
                 }
             }
         }
-        Ok(())
+        self.validate_gltf_images(field, value, &json, &bytes)
     }
 }
 

@@ -15,6 +15,7 @@
 mod content;
 mod digest;
 mod error;
+mod gltf_images;
 mod gltf_limits;
 mod gltf_uris;
 mod load;
