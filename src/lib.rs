@@ -7,6 +7,7 @@ pub mod collision;
 pub mod effect;
 pub mod emitter;
 pub mod export;
+mod input;
 pub mod material;
 pub mod matter;
 pub mod output;

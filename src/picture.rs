@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use image::error::{ImageError, ParameterError, ParameterErrorKind};
 use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader, Limits, Pixel};
 
+use crate::input::require_file;
 use crate::output::write_atomic;
 
 /// Why a picture could not be read or written. Every variant names the file.
@@ -52,7 +53,9 @@ const MAX_BYTES: u64 = 4 << 30;
 /// [`PictureError`].
 pub fn read_picture(path: &Path, format: ImageFormat, max_side: u32) -> Result<DynamicImage, PictureError> {
     let image = |source| PictureError::Image { path: path.into(), source };
-    let file = File::open(path).map_err(|source| PictureError::File { path: path.into(), source })?;
+    let unreadable = |source| PictureError::File { path: path.into(), source };
+    require_file(path).map_err(unreadable)?;
+    let file = File::open(path).map_err(unreadable)?;
     let mut reader = ImageReader::with_format(BufReader::new(file), format);
     let mut limits = Limits::default();
     limits.max_alloc = Some(MAX_BYTES);

@@ -13,6 +13,10 @@ mod export {
     mod rules;
     mod scene;
 }
+/// What goes wrong around the program: it is killed, the disk is full, nothing can be drawn.
+mod faults;
+/// Ten thousand spoilt files.
+mod fuzz;
 /// The real shaders on a real driver, against their twins.
 mod gpu {
     /// Small apps that render without a window.

@@ -22,6 +22,14 @@ pub enum EffectError {
     /// The file is not RON of the right shape.
     #[error("{0}")]
     Ron(#[from] ron::error::SpannedError),
+    /// The file is too large to be an effect.
+    #[error("it has {size} bytes; an effect has at most {max} (MAX_FILE_BYTES)")]
+    TooLarge {
+        /// Bytes.
+        size: u64,
+        /// The cap.
+        max: u64,
+    },
     /// An image of its stamps is no PNG, or too large.
     #[error("image `{file}`: {source}")]
     Picture {
@@ -82,6 +90,10 @@ impl WeatherEffect {
     /// # Errors
     /// [`EffectError`] names the line or the field.
     pub fn from_ron(bytes: &[u8]) -> Result<Self, EffectError> {
+        let (size, max) = (bytes.len() as u64, Self::MAX_FILE_BYTES);
+        if size > max {
+            return Err(EffectError::TooLarge { size, max });
+        }
         let options =
             ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
         let effect: Self = options.from_bytes(bytes)?;

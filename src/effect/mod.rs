@@ -139,6 +139,10 @@ pub enum Sprite {
 impl WeatherEffect {
     /// The most a particle may carry: a litre.
     pub const MAX_VOLUME_MM3: f32 = 1.0e6;
+    /// The largest effect that is read.
+    pub const MAX_FILE_BYTES: u64 = 1 << 20;
+    /// The largest file of its stamps that is read: twice what the largest takes without compression.
+    pub const MAX_PICTURE_BYTES: u64 = 128 << 20;
 
     /// Whether it leaves colour, gloss or relief.
     pub fn paints(&self) -> bool {

@@ -24,6 +24,12 @@ pub struct EmitterState {
 }
 
 impl EmitterState {
+    /// Whether it owes less than a particle, and less than a nanolitre, at this tick rate: as after every tick.
+    pub(crate) fn is_sound(&self, hz: u32) -> bool {
+        // What is left may be rounded to just below 0. Written so that NaN fails.
+        (-1.0..=f64::from(hz)).contains(&self.owed) && (0.0..=1.0).contains(&self.owed_nl)
+    }
+
     /// Adds one tick's worth of `rate` and takes out the whole particles. Also returns when within the tick the
     /// first is born, and the time between two, both in ticks.
     fn due(&mut self, rate: f32, hz: u32) -> (u32, f64, f64) {

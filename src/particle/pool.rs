@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Lifespan, Sequence};
 use crate::effect::EffectIndex;
+use crate::effect::drops::SIZE_CLASSES;
 
 /// A particle, with all that is known of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -214,6 +215,14 @@ impl From<Particle> for SavedParticle {
     }
 }
 
+impl SavedParticle {
+    /// Whether it is somewhere, and its drops of a size that there is.
+    pub(crate) fn is_sound(&self) -> bool {
+        let finite = |bits: [u32; 3]| bits.into_iter().all(|bits| f32::from_bits(bits).is_finite());
+        finite(self.position) && finite(self.velocity) && usize::from(self.class) < SIZE_CLASSES
+    }
+}
+
 impl From<SavedParticle> for Particle {
     fn from(saved: SavedParticle) -> Self {
         let vector = |bits: [u32; 3]| Vec3::from_array(bits.map(f32::from_bits));
@@ -315,5 +324,9 @@ mod tests {
         let back = Particle::from(SavedParticle::from(odd));
         assert_eq!(back.position.to_array().map(f32::to_bits), odd.position.to_array().map(f32::to_bits));
         assert_eq!((back.sequence, back.effect, back.lifespan), (odd.sequence, odd.effect, odd.lifespan));
+        let sound = |particle: Particle| SavedParticle::from(particle).is_sound();
+        assert!(sound(odd));
+        assert!(!sound(Particle { class: 16, ..odd }) && !sound(Particle { velocity: Vec3::NAN, ..odd }));
+        assert!(!sound(Particle { position: Vec3::INFINITY, ..odd }));
     }
 }

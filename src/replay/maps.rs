@@ -140,7 +140,7 @@ impl Run<'_> {
             let size = size.texels();
             let material = material.unwrap_or(&default);
             let now = Now::new(clock.tick(), clock.hz(), &drying, &geometry.0, exposure, material);
-            let read = SurfaceMaps::new(surface.name.clone(), size, water, matter, *loss, cpu, &now);
+            let mut read = SurfaceMaps::new(surface.name.clone(), size, water, matter, *loss, cpu, &now);
             if cpu.is_none()
                 && let Some(gpu) = gpu.filter(|gpu| gpu.has_colors)
             {

@@ -35,6 +35,7 @@ use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 
 use crate::clock::WeatheringClock;
+use crate::output::remove_temporaries;
 use crate::overlay::SplatBudget;
 use crate::picture::PictureError;
 use crate::save::{ColorMaps, SaveError, SavedScene};
@@ -210,6 +211,9 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
         files::require_writable(out)?;
         earlier = options.resume.is_some().then(|| SeriesTables::read(out));
         files::remove_earlier_outputs(out)?;
+        for folder in [out.clone(), out.join("maps")] {
+            remove_temporaries(&folder).map_err(|source| ReplayError::Write { path: folder, source })?;
+        }
         let taken: Vec<_> = taken.iter().map(|(_, name)| files::capture_file(name)).collect();
         files::remove_earlier_run(out, frames.start, &taken)?;
         run.begin_series(every);
@@ -253,7 +257,7 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
     };
     let report = report::report(run.app.world_mut(), options, &maps, timing);
     if let Some(out) = &options.out {
-        maps::write_maps(&out.join("maps"), &maps)?;
+        write_maps(&out.join("maps"), &maps)?;
         if let Some(series) = &series {
             series.write(out)?;
             plots::write_plots(out, &report.scenario, series)?;

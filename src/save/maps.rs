@@ -1,20 +1,23 @@
 //! The folder: pictures that hold words, and the state beside them.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use image::{ImageFormat, LumaA, Rgba};
-use tempfile::TempDir;
 
+use super::leftovers::{self, NEW, OLD, folder_beside};
 use super::{SaveError, SavedScene, SavedSurface, SceneState, SurfaceState, VERSION};
+use crate::input::{read_file, require_plain_file};
 use crate::matter::{SurfaceMatter, TexelMatter};
 use crate::output::write_atomic;
 use crate::overlay::{TILE_SIZE, Weatherable, Wrap};
-use crate::picture::{read_picture, square, write_picture};
+use crate::picture::{PictureError, read_picture, square, write_picture};
+use crate::scenario::Scenario;
 use crate::wetting::{Marks, SurfaceWater, TexelWater};
 
 /// The name of the state.
-const STATE: &str = "state.ron";
+pub(super) const STATE: &str = "state.ron";
 
 /// The maps of a surface; see [`file`].
 const MAPS: [&str; 14] = [
@@ -59,6 +62,7 @@ pub(super) fn check(folder: &Path) -> Result<PathBuf, SaveError> {
         return refused("it is no folder that can be replaced");
     };
     fs::create_dir_all(parent).map_err(failed)?;
+    leftovers::recover(&place).map_err(failed)?;
     if place.exists() {
         if std::env::current_dir().and_then(fs::canonicalize).is_ok_and(|here| here == place) {
             return refused("it is the folder that this runs in, which cannot be replaced");
@@ -79,6 +83,7 @@ pub(super) fn check(folder: &Path) -> Result<PathBuf, SaveError> {
             return refused(&format!("it holds maps, but no {STATE}: it is no saved scene"));
         }
     }
+    leftovers::remove(&place).map_err(failed)?;
     folder_beside(&place).map_err(failed)?;
     Ok(place)
 }
@@ -101,16 +106,11 @@ fn is_mounted(_: &Path, _: &Path) -> io::Result<bool> {
     Ok(false)
 }
 
-/// A folder that removes itself with all that is in it, unless it is kept.
-fn folder_beside(place: &Path) -> io::Result<TempDir> {
-    tempfile::Builder::new().prefix(".saving").tempdir_in(place.parent().unwrap_or(Path::new("/")))
-}
-
 pub(super) fn write(scene: &SavedScene, folder: &Path) -> Result<(), SaveError> {
     let failed = |source| SaveError::Write { path: folder.into(), source };
     let place = check(folder)?;
     let temporary = folder_beside(&place).map_err(failed)?;
-    let (new, old) = (temporary.path().join("new"), temporary.path().join("old"));
+    let (new, old) = (temporary.path().join(NEW), temporary.path().join(OLD));
     fs::create_dir(&new).map_err(failed)?;
     write_files(scene, &new)?;
     let replaces = place.exists();
@@ -120,7 +120,7 @@ pub(super) fn write(scene: &SavedScene, folder: &Path) -> Result<(), SaveError> 
     let Err(source) = fs::rename(&new, &place) else { return Ok(()) };
     if replaces && fs::rename(&old, &place).is_err() {
         // Better in another place than gone.
-        let kept = temporary.keep().join("old");
+        let kept = temporary.keep().join(OLD);
         let reason = format!("{source}; what was there is now {}", kept.display());
         return Err(failed(io::Error::other(reason)));
     }
@@ -183,22 +183,29 @@ fn file(folder: &Path, surface: &str, map: &str) -> PathBuf {
 pub(super) fn read(folder: &Path) -> Result<SavedScene, SaveError> {
     let path = folder.join(STATE);
     let failed = |source| SaveError::Read { path: path.clone(), source };
-    let size = fs::metadata(&path).map_err(failed)?.len();
-    if size > MAX_STATE_BYTES {
-        return Err(value(&path, "size", size, format!("at most {MAX_STATE_BYTES} bytes (MAX_STATE_BYTES)")));
-    }
-    let bytes = fs::read(&path).map_err(failed)?;
+    leftovers::recover(folder).map_err(failed)?;
+    // Of a stranger's folder, a link might lead anywhere.
+    require_plain_file(&path).map_err(failed)?;
+    let bytes = read_file(&path, MAX_STATE_BYTES).map_err(failed)?;
     let state: SceneState = ron::de::from_bytes(&bytes)
         .map_err(|source| SaveError::Parse { path: path.clone(), source: source.into() })?;
     if state.version != VERSION {
         return Err(value(&path, "version", state.version, VERSION.to_string()));
     }
-    let mut surfaces = Vec::new();
+    if state.surfaces.len() > Scenario::MAX_SURFACES {
+        let expected = format!("at most {} (MAX_SURFACES)", Scenario::MAX_SURFACES);
+        return Err(value(&path, "surfaces", state.surfaces.len(), expected));
+    }
+    let (mut surfaces, mut names) = (Vec::new(), BTreeSet::new());
     for (index, surface) in state.surfaces.iter().enumerate() {
         let plain = !surface.name.is_empty() && !surface.name.contains(['/', '\\']) && surface.name != "..";
         if !plain {
             let field = format!("surfaces[{index}].name");
             return Err(value(&path, &field, &surface.name, "a plain name".into()));
+        }
+        if !names.insert(&surface.name) {
+            let field = format!("surfaces[{index}].name");
+            return Err(value(&path, &field, &surface.name, "unique".into()));
         }
         if surface.size == 0 {
             surfaces.push(SavedSurface {
@@ -284,6 +291,7 @@ fn part(bits: u32) -> f32 {
 
 /// The bytes of a picture of this size with so many channels of 8 bits.
 fn read_png(path: &Path, size: u32, channels: u8) -> Result<Vec<u8>, SaveError> {
+    require_plain_file(path).map_err(|source| PictureError::File { path: path.into(), source })?;
     let image = read_picture(path, ImageFormat::Png, Weatherable::MAX_MAP_SIZE)?;
     if (image.width(), image.height()) != (size, size) {
         let found = format!("{}x{}", image.width(), image.height());

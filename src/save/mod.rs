@@ -17,6 +17,7 @@
 //! Not kept: rings of drops, which live for less than a second.
 
 mod error;
+mod leftovers;
 mod maps;
 mod restore;
 
@@ -196,7 +197,8 @@ impl SavedScene {
 
     /// Writes the folder, in place of one that was saved there before. Everything is written beside it first, then that
     /// one is moved aside, and back again if the new one cannot take its place. There is never half a scene in the folder;
-    /// between two renames there is none.
+    /// between two renames there is none. If the program is killed just then, whoever reads or writes the folder next moves the
+    /// new one there.
     ///
     /// # Errors
     /// [`SaveError`] with the file; as [`Self::check_folder`], too.

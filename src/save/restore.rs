@@ -16,7 +16,7 @@ use crate::overlay::{
     CpuMaps, Lying, MapLoss, MapSize, Overlays, SurfaceFrames, SurfaceTotals, SurfaceTraces, Weatherable,
     mip_chain,
 };
-use crate::particle::Particles;
+use crate::particle::{ParticleCounts, Particles};
 use crate::scenario::{Digest, LoadedScenario, check_weather, rewind};
 use crate::weather::DryingClock;
 use crate::wetting::SurfaceWater;
@@ -66,6 +66,16 @@ impl SavedScene {
             let expected = format!("{}, as many as `particles`", state.particles.len());
             return Err(value(&path, "counts.alive", state.counts.alive, expected));
         }
+        let ParticleCounts { emitted, alive, hit, expired, .. } = state.counts;
+        let sum = alive.checked_add(hit).and_then(|sum| sum.checked_add(expired));
+        if sum != Some(emitted) {
+            let expected = "the sum of `alive`, `hit` and `expired`".into();
+            return Err(value(&path, "counts.emitted", emitted, expected));
+        }
+        if let Some(index) = state.emitters.iter().position(|emitter| !emitter.is_sound(state.hz)) {
+            let expected = "less than a particle and a nanolitre".into();
+            return Err(value(&path, &format!("emitters[{index}]"), "owing more", expected));
+        }
         if let Err(wrong) = check_weather(&state.weather) {
             let expected = format!("{} to {}", wrong.least, wrong.most);
             return Err(value(&path, &format!("weather.{}", wrong.field), wrong.value, expected));
@@ -83,6 +93,12 @@ impl SavedScene {
             saved.map(|particle| usize::from(particle.effect)).find(|&effect| effect >= effects)
         {
             return Err(value(&path, "effect of a particle", effect, format!("below {effects}")));
+        }
+        if let Some(particle) =
+            state.particles.iter().chain(&state.waiting).find(|particle| !particle.is_sound())
+        {
+            let expected = "at a place, with a speed, and of one of the size classes".into();
+            return Err(value(&path, "a particle", format!("number {}", particle.sequence), expected));
         }
 
         rewind(world, state.tick);

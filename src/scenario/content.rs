@@ -9,12 +9,15 @@ use bevy::prelude::*;
 use bevy::render::render_resource::Face;
 
 use super::{
-    LoadedScenario, MaterialSpec, MeshSpec, ScenarioError, SurfaceSpec, SurfaceTextureSpec, TextureSpec,
+    LoadedScenario, MaterialSpec, MeshSpec, Scenario, ScenarioError, SurfaceSpec, SurfaceTextureSpec,
+    TextureSpec,
 };
 use crate::collision::MeshTriangles;
 use crate::effect::WeatherEffect;
+use crate::input::read_file;
 use crate::material::WettingTextures;
 use crate::overlay::Weatherable;
+use crate::picture::read_picture;
 use crate::scenes::environment::{
     EnvironmentMaps, EnvironmentSettings, environment_maps_from_equirect, load_equirect,
 };
@@ -112,14 +115,16 @@ impl LoadedScenario {
         for (index, emitter) in self.scenario.emitters.iter().enumerate() {
             let field = format!("emitters[{index}].effect");
             let path = self.resolve(&field, &emitter.effect)?;
-            let bytes = std::fs::read(path).map_err(|e| self.content_error(&field, &emitter.effect, e))?;
+            let bytes = read_file(&path, WeatherEffect::MAX_FILE_BYTES)
+                .map_err(|e| self.content_error(&field, &emitter.effect, e))?;
             let wrong = |e| self.content_error(&field, &emitter.effect, e);
             let mut effect = WeatherEffect::from_ron(&bytes).map_err(wrong)?;
             let mut files = BTreeMap::new();
             for file in effect.stamps.files() {
                 let beside = Path::new(&emitter.effect).with_file_name(file);
                 let path = self.resolve(&field, &beside.to_string_lossy())?;
-                let bytes = std::fs::read(path).map_err(|e| self.content_error(&field, file, e))?;
+                let bytes = read_file(&path, WeatherEffect::MAX_PICTURE_BYTES)
+                    .map_err(|e| self.content_error(&field, file, e))?;
                 files.insert(file.to_owned(), bytes);
             }
             effect.stamp_set = effect.stamps.read(&files).map_err(wrong)?;
@@ -224,8 +229,7 @@ impl LoadedScenario {
     /// A tiling texture from a `.png`.
     fn photo(&self, field: &str, file: &str, is_srgb: bool) -> Result<Image, ScenarioError> {
         let path = self.resolve(field, file)?;
-        let bytes = std::fs::read(&path).map_err(|e| self.content_error(field, file, e))?;
-        let picture = image::load_from_memory_with_format(&bytes, image::ImageFormat::Png);
+        let picture = read_picture(&path, image::ImageFormat::Png, Scenario::MAX_TEXTURE);
         let picture = picture.map_err(|e| self.content_error(field, file, e))?;
         // Whatever it was: 16-bit and grey ones, as wet maps are, too.
         let image =
@@ -294,7 +298,6 @@ mod tests {
     use bevy::render::render_resource::TextureFormat;
 
     use super::*;
-    use crate::scenario::Scenario;
     use crate::wetmap::{GreyMap, write_map};
 
     #[test]

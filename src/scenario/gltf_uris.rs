@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use super::{LoadedScenario, ScenarioError};
-use crate::scenes::gltf_mesh::{data_uri, percent_decoded};
+use crate::input::read_file;
+use crate::scenes::gltf_mesh::{MAX_FILE_BYTES, data_uri, percent_decoded};
 
 impl LoadedScenario {
     /// Checks that a glTF and every buffer and image it refers to exist inside the tree. `value` is its path there, `field`
@@ -20,12 +21,14 @@ impl LoadedScenario {
     /// A glTF and every buffer and image it refers to; all of them exist inside the tree.
     pub(super) fn gltf_files(&self, field: &str, value: &str) -> Result<Vec<PathBuf>, ScenarioError> {
         let file = self.resolve(field, value)?;
-        let bytes = std::fs::read(&file).map_err(|error| self.content_error(field, value, error))?;
+        let bytes = read_file(&file, MAX_FILE_BYTES).map_err(|e| self.content_error(field, value, e))?;
         let json = match json_chunk(&bytes) {
             Some(json) => serde_json::from_slice::<Value>(json),
             None => serde_json::from_slice::<Value>(&bytes),
         };
         let json = json.map_err(|error| self.content_error(field, value, format!("not a glTF: {error}")))?;
+        super::gltf_limits::check(&json)
+            .map_err(|(inner, reason)| self.content_error(&format!("{field} -> {inner}"), value, reason))?;
         let folder = Path::new(value).parent().unwrap_or(Path::new(""));
         let mut files = vec![file];
         for list in ["buffers", "images"] {
@@ -38,6 +41,7 @@ impl LoadedScenario {
                 }
             }
         }
+        self.validate_gltf_images(field, value, &json, &bytes)?;
         Ok(files)
     }
 }

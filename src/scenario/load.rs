@@ -8,6 +8,7 @@ use ron::extensions::Extensions;
 
 use super::merge::{Merged, Origins};
 use super::{Scenario, ScenarioError, ScenarioPart};
+use crate::input::require_file;
 
 /// A scenario that passed every check that needs no scene.
 #[derive(Debug, Clone)]
@@ -111,6 +112,7 @@ struct Reader {
 impl Reader {
     fn read(&mut self, file: &Path) -> Result<ScenarioPart, ScenarioError> {
         let read = |source| ScenarioError::Read { file: file.into(), source };
+        require_file(file).map_err(read)?;
         let (size, max) = (std::fs::metadata(file).map_err(read)?.len(), Scenario::MAX_FILE_BYTES);
         if size > max {
             return Err(ScenarioError::TooLarge { file: file.into(), size, max });
@@ -205,13 +207,18 @@ fn resolve(tree: &Path, file: &Path, field: &str, value: &str) -> Result<PathBuf
     if value.is_empty() || !path.components().all(plain) {
         return Err(outside());
     }
-    let path = tree.join(path).canonicalize().map_err(|source| ScenarioError::Missing {
+    let missing = |source| ScenarioError::Missing {
         file: file.into(),
         field: field.into(),
         value: value.into(),
         source,
-    })?;
-    if path.starts_with(tree) { Ok(path) } else { Err(outside()) }
+    };
+    let path = tree.join(path).canonicalize().map_err(missing)?;
+    if !path.starts_with(tree) {
+        return Err(outside());
+    }
+    require_file(&path).map_err(missing)?;
+    Ok(path)
 }
 
 impl LoadedScenario {

@@ -16,6 +16,8 @@ mod content;
 mod digest;
 mod error;
 mod files;
+mod gltf_images;
+mod gltf_limits;
 mod gltf_uris;
 mod load;
 mod merge;

@@ -72,6 +72,10 @@ impl LoadedScenario {
         self.validate_view()?;
         // Wind and direction of the sun have been checked by their own names.
         check_weather(&scenario.weather()).map_err(|wrong| self.out_of_range("weather", wrong))?;
+        if scenario.materials.len() > Scenario::MAX_MATERIALS {
+            let expected = format!("at most {} (MAX_MATERIALS)", Scenario::MAX_MATERIALS);
+            return Err(self.value("materials", scenario.materials.len(), expected));
+        }
         for (name, material) in &scenario.materials {
             self.validate_material(&format!("materials.{name}"), material)?;
         }
@@ -80,9 +84,11 @@ impl LoadedScenario {
             return Err(self.value("surfaces", scenario.surfaces.len(), expected));
         }
         let mut names = BTreeSet::new();
+        let (mut triangles, mut texels) = (0, 0);
         for (index, surface) in scenario.surfaces.iter().enumerate() {
             let field = format!("surfaces[{index}]");
-            self.validate_surface(&field, surface)?;
+            triangles += self.validate_surface(&field, surface)?;
+            texels += u64::from(surface.maps.texels()).pow(2);
             if let Some(map) = &surface.wet_map {
                 self.resolve(&format!("{field}.wet_map.map"), &map.map)?;
                 self.positive(&format!("{field}.wet_map.seconds"), map.seconds, Scenario::MAX_SECONDS)?;
@@ -92,6 +98,14 @@ impl LoadedScenario {
             if !names.insert(&surface.name) {
                 return Err(self.value(format!("{field}.name"), &surface.name, "unique"));
             }
+        }
+        if triangles > Scenario::MAX_ALL_TRIANGLES {
+            let expected = format!("at most {} (MAX_ALL_TRIANGLES)", Scenario::MAX_ALL_TRIANGLES);
+            return Err(self.value("surfaces", format!("of {triangles} triangles"), expected));
+        }
+        if texels > Scenario::MAX_TEXELS {
+            let expected = format!("at most {} (MAX_TEXELS)", Scenario::MAX_TEXELS);
+            return Err(self.value("surfaces", format!("of {texels} texels"), expected));
         }
         if scenario.emitters.len() > Scenario::MAX_EMITTERS {
             let expected = format!("at most {} (MAX_EMITTERS)", Scenario::MAX_EMITTERS);
@@ -164,7 +178,8 @@ impl LoadedScenario {
         Ok(())
     }
 
-    fn validate_surface(&self, field: &str, surface: &SurfaceSpec) -> Result<(), ScenarioError> {
+    /// Also how many triangles it is made of; 0 if they come from a file.
+    fn validate_surface(&self, field: &str, surface: &SurfaceSpec) -> Result<u64, ScenarioError> {
         // It becomes part of file names.
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
         if surface.name.is_empty() || surface.name.len() > 64 || !surface.name.chars().all(plain) {
@@ -193,11 +208,11 @@ impl LoadedScenario {
             | MeshSpec::Cloth { size, cells } => {
                 self.positive(&format!("{field}.mesh.size.x"), size.x, FAR)?;
                 self.positive(&format!("{field}.mesh.size.y"), size.y, FAR)?;
-                u64::from(cells.x) * u64::from(cells.y) * 2
+                product([2, u64::from(cells.x), u64::from(cells.y), 1])
             }
             MeshSpec::Sphere { radius, sectors, stacks } | MeshSpec::Rock { radius, sectors, stacks, .. } => {
                 self.positive(&format!("{field}.mesh.radius"), *radius, FAR)?;
-                u64::from(*sectors) * u64::from(*stacks) * 2
+                product([2, u64::from(*sectors), u64::from(*stacks), 1])
             }
             MeshSpec::BasRelief { size, depth, cells, .. } => {
                 self.positive(&format!("{field}.mesh.size.x"), size.x, FAR)?;
@@ -226,15 +241,18 @@ impl LoadedScenario {
             }
             MeshSpec::Vase { height, segments, rings } | MeshSpec::Flowerpot { height, segments, rings } => {
                 self.positive(&format!("{field}.mesh.height"), *height, FAR)?;
-                u64::from(*segments) * u64::from(*rings) * 2
+                product([2, u64::from(*segments), u64::from(*rings), 1])
             }
-            MeshSpec::File(path) => return self.validate_gltf(&format!("{field}.mesh"), path),
+            MeshSpec::File(path) => {
+                self.validate_gltf(&format!("{field}.mesh"), path)?;
+                return Ok(0);
+            }
         };
         if triangles == 0 || triangles > Scenario::MAX_TRIANGLES {
             let expected = format!("1 to {} triangles (MAX_TRIANGLES)", Scenario::MAX_TRIANGLES);
             return Err(self.value(format!("{field}.mesh"), format!("{triangles} triangles"), expected));
         }
-        Ok(())
+        Ok(triangles)
     }
 
     fn validate_emitter(&self, field: &str, emitter: &EmitterSpec) -> Result<(), ScenarioError> {

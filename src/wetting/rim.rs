@@ -30,7 +30,10 @@ pub(crate) struct RimScratch {
 /// Measures the rims if a shower is over; whether it did.
 pub(crate) fn measure_rims(water: &mut SurfaceWater, now: &Now, scratch: &mut RimScratch) -> bool {
     let pause = (SHOWER_SECONDS * now.hz as f32) as u32;
-    if water.rained_at == 0 || now.tick < water.rained_at + pause || !water.tiles.running.is_empty() {
+    if water.rained_at == 0
+        || now.tick < water.rained_at.saturating_add(pause)
+        || !water.tiles.running.is_empty()
+    {
         return false;
     }
     water.rained_at = 0;

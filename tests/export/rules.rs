@@ -118,7 +118,7 @@ impl Glb {
         let field = format!("accessors[{index}]");
         let view = &self.list("bufferViews")[count(&accessor["bufferView"])];
         let (component, offset) = (component(accessor), count(&accessor["byteOffset"]));
-        assert!((count(&view["byteOffset"]) + offset) % component == 0, "{field} is not aligned");
+        assert!((count(&view["byteOffset"]) + offset).is_multiple_of(component), "{field} is not aligned");
         assert!(offset % component == 0 && count(&accessor["count"]) > 0, "{field}");
         // Slices beyond the view panic.
         let elements = self.elements(accessor);
@@ -148,7 +148,7 @@ impl Glb {
             let view = &self.list("bufferViews")[count(&values["bufferView"])];
             let stride =
                 view["byteStride"].as_u64().map_or(component(values) * parts(values), |s| s as usize);
-            assert!(stride % 4 == 0, "{field}.{name}: vertices begin at whole words");
+            assert!(stride.is_multiple_of(4), "{field}.{name}: vertices begin at whole words");
             assert!(view["target"].is_null() || view["target"] == 34_962, "{field}.{name}");
         }
         let position = accessor(&attributes["POSITION"]);
@@ -176,7 +176,7 @@ impl Glb {
                 "{field}.indices"
             );
             assert!(
-                primitive["mode"].as_u64().unwrap_or(4) != 4 || indices.len() % 3 == 0,
+                primitive["mode"].as_u64().unwrap_or(4) != 4 || indices.len().is_multiple_of(3),
                 "{field}.indices"
             );
         }

@@ -8,13 +8,14 @@ use std::process::ExitCode;
 use bevy_weathering::scenario::{LoadedScenario, Scenario, ScenarioError, schema_json};
 
 use crate::cli::CheckArgs;
+use crate::print;
 
 /// Checks all files; exit code 2 if one of them cannot be run.
 pub fn run(arguments: &CheckArgs) -> Result<ExitCode, Box<dyn Error>> {
     let mut code = ExitCode::SUCCESS;
     for file in &arguments.files {
         match check(file, arguments.variant.as_deref()) {
-            Ok(summaries) => summaries.iter().for_each(|summary| println!("{summary}")),
+            Ok(summaries) => summaries.iter().try_for_each(print)?,
             Err(error) => {
                 eprintln!("error: {error}");
                 code = ExitCode::from(2);
@@ -26,7 +27,7 @@ pub fn run(arguments: &CheckArgs) -> Result<ExitCode, Box<dyn Error>> {
 
 /// Prints the schema.
 pub fn print_schema() -> Result<ExitCode, Box<dyn Error>> {
-    println!("{}", serde_json::to_string_pretty(&schema_json())?);
+    print(serde_json::to_string_pretty(&schema_json())?)?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -11,6 +11,8 @@ mod wet_texture;
 mod wetmap;
 
 use std::error::Error;
+use std::fmt::Display;
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -18,6 +20,13 @@ use clap::Parser;
 /// What has done all it should.
 fn done(result: Result<(), Box<dyn Error>>) -> Result<ExitCode, Box<dyn Error>> {
     result.map(|()| ExitCode::SUCCESS)
+}
+
+/// Writes a line to standard output, which may be a full disk or a pipe that nobody reads any more.
+fn print(line: impl Display) -> Result<(), Box<dyn Error>> {
+    let mut out = std::io::stdout().lock();
+    let written = writeln!(out, "{line}").and_then(|()| out.flush());
+    written.map_err(|error| format!("cannot write to standard output: {error}").into())
 }
 
 fn main() -> ExitCode {

@@ -11,6 +11,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::batch;
 use crate::cli::ReplayArgs;
+use crate::print;
 
 /// Exit code 1 if something was not as the scenario expects it.
 pub fn run(arguments: &ReplayArgs) -> Result<ExitCode, Box<dyn Error>> {
@@ -52,10 +53,11 @@ fn run_one(file: &Path, arguments: &ReplayArgs) -> Result<ExitCode, Box<dyn Erro
     match &arguments.out {
         Some(out) => {
             let hits = report.particles.hit;
-            println!("{hits} impacts, {} pictures, digest {}", report.timing.frames, report.digest);
-            println!("{}", out.join("report.json").display());
+            let frames = report.timing.frames;
+            print(format!("{hits} impacts, {frames} pictures, digest {}", report.digest))?;
+            print(out.join("report.json").display())?;
         }
-        None => println!("{}", serde_json::to_string_pretty(&report)?),
+        None => print(serde_json::to_string_pretty(&report)?)?,
     }
     for outcome in report.failed() {
         eprintln!("not as expected: {}", describe(outcome));

@@ -35,7 +35,7 @@ pub fn run(arguments: &StampsArgs) -> Result<(), Box<dyn Error>> {
     let made: Vec<_> = made.collect::<Result<_, _>>()?;
     for (kind, strips) in &made {
         for path in write_stamps(&arguments.out, *kind, strips)? {
-            println!("{}", path.display());
+            crate::print(path.display())?;
         }
     }
     Ok(())

@@ -21,6 +21,5 @@ pub fn run(arguments: &WetTextureArgs) -> Result<(), Box<dyn Error>> {
     });
     let wet = wet_texture(&read_texture(&arguments.file)?, &how)?;
     write_texture(&out, &wet)?;
-    println!("{}", out.display());
-    Ok(())
+    crate::print(out.display())
 }

@@ -151,8 +151,7 @@ pub fn run(command: &WetMapCommand) -> Result<(), Box<dyn Error>> {
         WetMapCommand::Drops(arguments) => dropped(arguments)?,
     };
     write_map(out, &map)?;
-    println!("{}", out.display());
-    Ok(())
+    crate::print(out.display())
 }
 
 fn spotted(arguments: &FromPhotoArgs) -> Result<GreyMap, Box<dyn Error>> {
@@ -162,7 +161,8 @@ fn spotted(arguments: &FromPhotoArgs) -> Result<GreyMap, Box<dyn Error>> {
     let both = format!("{} and {}", arguments.dry.display(), arguments.wet.display());
     let mask = wet_mask(&dry, &wet, &options).map_err(|error| format!("{both}: {error}"))?;
     let map = mask.gradients(gradient)?;
-    println!("{} spots on {:.1} % of the picture", mask.spots().len(), 100.0 * mask.coverage());
+    let coverage = 100.0 * mask.coverage();
+    crate::print(format!("{} spots on {coverage:.1} % of the picture", mask.spots().len()))?;
     Ok(map)
 }
 

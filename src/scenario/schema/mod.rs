@@ -82,6 +82,14 @@ impl Scenario {
     pub const MAX_RATE: f32 = 10_000_000.0;
     /// The most triangles of a generated mesh.
     pub const MAX_TRIANGLES: u64 = 20_000_000;
+    /// The most triangles of all generated meshes together.
+    pub const MAX_ALL_TRIANGLES: u64 = 100_000_000;
+    /// The most texels of the maps of all surfaces together: 256 of the largest.
+    pub const MAX_TEXELS: u64 = 1 << 30;
+    /// The most materials: each has textures of its own, which a thread makes.
+    pub const MAX_MATERIALS: usize = 256;
+    /// The most texels along a side of a picture that is a texture or a wet map.
+    pub const MAX_TEXTURE: u32 = 8192;
 }
 
 /// The JSON Schema of scenario files. RON's `Kind(field: 1)` is `{"Kind": {"field": 1}}` there, `(field: 1)` an object.

@@ -90,7 +90,7 @@ impl Default for EnvironmentSettings {
 #[non_exhaustive]
 pub enum EnvironmentError {
     /// The file cannot be opened or read.
-    #[error("cannot read environment map {}", path.display())]
+    #[error("cannot read environment map {}: {source}", .path.display())]
     Read {
         /// The file.
         path: PathBuf,
@@ -98,7 +98,7 @@ pub enum EnvironmentError {
         source: std::io::Error,
     },
     /// The file is not an image, or not one that can be decoded.
-    #[error("cannot decode environment map {}", path.display())]
+    #[error("cannot decode environment map {}: {source}", .path.display())]
     Decode {
         /// The file.
         path: PathBuf,

@@ -112,6 +112,7 @@ pub fn read_meshes(path: &Path) -> Result<Vec<NamedMesh>, GltfMeshError> {
     waiting.reverse();
     let mut seen = vec![false; document.nodes().count()];
     let mut meshes = Vec::new();
+    let mut elements = 0;
     while let Some((node, scene_from_parent)) = waiting.pop() {
         let field = format!("nodes[{}]", node.index());
         if std::mem::replace(&mut seen[node.index()], true) {
@@ -125,6 +126,13 @@ pub fn read_meshes(path: &Path) -> Result<Vec<NamedMesh>, GltfMeshError> {
         if let Some(mesh) = node.mesh()
             && let Some((triangles, has_uvs)) = file.triangles(&mesh, mesh.primitives())?
         {
+            // A mesh that many nodes show is read for each of them.
+            elements += triangles.positions.len() * 3;
+            if elements > MAX_ELEMENTS {
+                return Err(
+                    file.content(&field, format!("and those before show more than {MAX_ELEMENTS} corners"))
+                );
+            }
             let name = node.name().or(mesh.name()).map(String::from);
             meshes.push(NamedMesh {
                 name: name.unwrap_or_else(|| format!("mesh{}", mesh.index())),

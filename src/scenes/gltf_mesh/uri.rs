@@ -7,10 +7,12 @@ use base64::prelude::{BASE64_STANDARD, Engine};
 use percent_encoding::percent_decode_str;
 
 use super::{GltfMeshError, MAX_FILE_BYTES};
+use crate::input::require_file;
 
 /// A file of at most [`MAX_FILE_BYTES`].
 pub(crate) fn read_capped(path: &Path) -> Result<Vec<u8>, GltfMeshError> {
     let read = |source| GltfMeshError::Read { path: path.into(), source };
+    require_file(path).map_err(read)?;
     let size = std::fs::metadata(path).map_err(read)?.len();
     if size > MAX_FILE_BYTES {
         return Err(GltfMeshError::TooLarge { path: path.into(), size, max: MAX_FILE_BYTES });

@@ -1,0 +1,106 @@
+//! Folders of saved scenes.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use bevy_weathering::replay::{ReplayOptions, replay};
+use bevy_weathering::save::SavedScene;
+use bevy_weathering::scenario::Scenario;
+
+use super::harness::fuzz;
+use super::scenarios::{SMALL, tree};
+use super::{mutate, run, write};
+
+/// Puts a file back as it was, also if what was done with it panicked.
+struct PutBack<'a>(&'a Path, &'a [u8]);
+
+impl Drop for PutBack<'_> {
+    fn drop(&mut self) {
+        write(self.0, self.1);
+    }
+}
+
+#[test]
+fn spoilt_states_are_restored_or_refused() {
+    let tree = tree();
+    let scene = tree.path().join("scenarios/scene.ron");
+    write(&scene, SMALL);
+    let kept = tree.path().join("kept");
+    let options = ReplayOptions {
+        render: false,
+        seconds: Some(0.5),
+        save: Some(kept.clone()),
+        ..ReplayOptions::new(Scenario::load(&scene).expect("it is whole"))
+    };
+    replay(&options, |_| ()).expect("it runs");
+    let mut files: Vec<(PathBuf, Vec<u8>)> = Vec::new();
+    for entry in fs::read_dir(&kept).expect("it was saved") {
+        let file = entry.expect("it can be read").path();
+        let bytes = fs::read(&file).expect("it can be read");
+        files.push((file, bytes));
+    }
+    files.sort();
+    let state = files.iter().position(|(file, _)| file.ends_with("state.ron")).expect("it was saved");
+    let text = String::from_utf8(files[state].1.clone()).expect("it is text");
+    assert!(files.len() > 10 && text.contains("particles"), "{} files", files.len());
+
+    let tally = fuzz("states", 1000, move |_, random| {
+        let _ = &tree;
+        let (file, whole) = if random.below(3) > 0 { &files[state] } else { mutate::pick(random, &files) };
+        let spoilt = if file.ends_with("state.ron") {
+            mutate::text(random, &text, &[])
+        } else {
+            mutate::png(random, whole)
+        };
+        write(file, spoilt);
+        let _put_back = PutBack(file, whole);
+        let read = SavedScene::read(&kept).map_err(|error| {
+            let message = error.to_string();
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            // Or a map that another state would have.
+            assert!(message.contains(&*name) || message.contains(".png"), "no file is named: {message}");
+            message
+        });
+        read.and_then(|saved| {
+            // So few ticks that any test machine has the time for them.
+            if random.below(10) == 0 && saved.tick() <= 40 {
+                let scenario = Scenario::load(&scene).map_err(|error| error.to_string())?;
+                run(scenario, saved.tick() as f32 / 20.0 + 0.2, Some(kept.clone()))?;
+            }
+            Ok(())
+        })
+    });
+    assert!(tally.accepted > 20 && tally.refused > 200, "{tally:?}");
+}
+
+#[test]
+#[cfg(unix)]
+fn links_and_pipes_in_a_saved_scene_are_refused() {
+    let tree = tree();
+    let scene = tree.path().join("scenarios/scene.ron");
+    write(&scene, SMALL);
+    let kept = tree.path().join("kept");
+    let options = ReplayOptions {
+        render: false,
+        seconds: Some(0.1),
+        save: Some(kept.clone()),
+        ..ReplayOptions::new(Scenario::load(&scene).expect("it is whole"))
+    };
+    replay(&options, |_| ()).expect("it runs");
+    let tally = fuzz("links in states", 4, move |number, _| {
+        let file = kept.join(["state.ron", "floor_diffuse.png"][number % 2]);
+        let elsewhere = tree.path().join(format!("elsewhere{number}"));
+        fs::rename(&file, &elsewhere).expect("it can be moved");
+        if number < 2 {
+            std::os::unix::fs::symlink(&elsewhere, &file).expect("a new link");
+        } else {
+            let made = std::process::Command::new("mkfifo").arg(&file).status().expect("mkfifo runs");
+            assert!(made.success());
+        }
+        let refused = SavedScene::read(&kept).map(drop).map_err(|error| error.to_string());
+        fs::remove_file(&file).expect("it can be removed");
+        fs::rename(&elsewhere, &file).expect("it can be moved back");
+        refused
+    });
+    assert_eq!(tally.refused, 4, "{tally:?}");
+}
