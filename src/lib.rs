@@ -35,7 +35,7 @@ pub mod prelude {
     pub use crate::clock::WeatheringClock;
     pub use crate::collision::{ReportImpacts, SurfaceImpact};
     pub use crate::effect::WeatherEffect;
-    pub use crate::emitter::{Emitter, EmitterShape, Flow, LiveBudgetPlugin};
+    pub use crate::emitter::{Emitter, EmitterShape, Flow};
     pub use crate::material::{PorousMaterial, StandingWater, WettingModel};
     pub use crate::overlay::{MapBudget, OverlayUv, Weatherable, Wrap};
     pub use crate::particle::Forces;

@@ -5,7 +5,7 @@ use rand_pcg::Pcg32;
 use serde::{Deserialize, Serialize};
 
 use super::shape::unit;
-use super::{EmissionScale, EmissionSeed, Emitter};
+use super::{EmissionSeed, Emitter};
 use crate::clock::WeatheringClock;
 use crate::effect::drops::SIZE_CLASSES;
 use crate::effect::{DropSizes, EffectTable};
@@ -97,9 +97,7 @@ pub fn emit_particles(
     mut counts: ResMut<ParticleCounts>,
     mut water: ResMut<WaterCounts>,
     mut new: ResMut<NewParticles>,
-    scale: Res<EmissionScale>,
     mut order: Local<Vec<(u32, Entity)>>,
-    mut held: Local<f64>,
     mut emitters: Query<(&Emitter, &mut EmitterState, &GlobalTransform)>,
     streams: Query<(&Emitter, Entity)>,
 ) {
@@ -117,18 +115,13 @@ pub fn emit_particles(
         let Some(index) = effects.index_of(&emitter.effect) else { continue };
         let Some(row) = effects.row(index) else { continue };
         let Some(effect) = &row.effect else { continue };
-        // Fewer that carry more each.
-        let (rate, volume_mm3) = (emitter.rate * scale.0, emitter.particle_mm3(effect) / scale.0);
-        *held += f64::from(emitter.rate - rate) / f64::from(clock.hz());
-        if rate <= 0.0 {
-            continue;
-        }
+        let volume_mm3 = emitter.particle_mm3(effect);
 
         let state = &mut *state;
         // Emitters that share a number do not send the same particles.
         let own_stream = || Pcg32::new(seed.0, u64::from(number) | u64::from(twins) << 32);
         let mut rng = state.rng.take().unwrap_or_else(own_stream);
-        let (due, first, interval) = state.due(rate, clock.hz());
+        let (due, first, interval) = state.due(emitter.rate, clock.hz());
         let room = u64::from(config.max_alive).saturating_sub(counts.alive + new.particles.len() as u64);
         let count = u64::from(due).min(room) as u32;
         counts.refused += u64::from(due - count);
@@ -160,8 +153,6 @@ pub fn emit_particles(
         }
         state.rng = Some(rng);
     }
-    counts.held_back += held.trunc() as u64;
-    *held = held.fract();
 }
 
 /// Spawns what [`emit_particles`] wrote, in one batch.

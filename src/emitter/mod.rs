@@ -6,7 +6,6 @@
 //! own random stream, seeded by [`EmissionSeed`] and the emitter's number; nothing else draws from it.
 
 mod emit;
-mod live;
 mod shape;
 
 use bevy::prelude::*;
@@ -17,7 +16,6 @@ use crate::effect::WeatherEffect;
 use crate::schedule::{WeatheringSystems, WeatheringTick};
 
 pub use emit::{EmitterState, NewParticles, emit_particles, spawn_particles};
-pub use live::{EmissionScale, LiveBudget, LiveBudgetPlugin, LiveLoad, next_scale};
 
 /// Sends out particles of one effect. Configuration only; see [`EmitterState`] for what it has done.
 #[derive(Component, Reflect, Debug, Clone)]
@@ -146,9 +144,7 @@ impl Plugin for EmitterPlugin {
     fn build(&self, app: &mut App) {
         app.register_type::<Emitter>()
             .register_type::<EmissionSeed>()
-            .register_type::<EmissionScale>()
             .init_resource::<EmissionSeed>()
-            .init_resource::<EmissionScale>()
             .init_resource::<NewParticles>()
             .add_systems(
                 WeatheringTick,

@@ -91,7 +91,6 @@ impl ExportReport {
                 hit: counts.hit,
                 expired: counts.expired,
                 refused: counts.refused,
-                held_back: counts.held_back,
             },
             water: outcome.water,
             surfaces,

@@ -40,7 +40,7 @@ pub(crate) use deposit::measure_texels;
 pub use deposit::{DepositPlugin, PrepareStamps, SplatQueue, SurfaceTotals, SurfaceTraces, deposit_splats};
 pub(crate) use frames::FramesWork;
 pub use frames::{SurfaceFrames, TexelFrame};
-pub use gpu::{GpuOverlayPlugin, MipStep, Overlays, SplatBudget, SplatStats, SurfaceBatch};
+pub use gpu::{GpuOverlayPlugin, MipStep, Overlays, SplatStats, SurfaceBatch};
 pub(crate) use maps::Footprint;
 pub use maps::{RainRing, TexelArea, TexelAreas};
 pub use mips::{Lying, mip_chain, mip_levels};

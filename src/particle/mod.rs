@@ -109,10 +109,6 @@ pub struct ParticleCounts {
     pub expired: u64,
     /// Particles not spawned because [`ParticleConfig::max_alive`] was reached; not part of `emitted`.
     pub refused: u64,
-    /// Particles that were not spawned because of the [`EmissionScale`](crate::emitter::EmissionScale), whose load others carry;
-    /// not part of `emitted`.
-    #[serde(default)]
-    pub held_back: u64,
 }
 
 /// The water of all particles so far, nanolitres. `emitted` and what surfaces dripped is what they received, what expired,

@@ -78,7 +78,6 @@ pub(super) fn build(options: &ReplayOptions, scenario: ScenarioPlugin) -> App {
                 .disable::<PanicHandlerPlugin>()
                 .disable::<TerminalCtrlCHandlerPlugin>(),
         )
-        .insert_resource(options.splat_budget)
         .add_plugins(WeatheringPlugins);
     } else {
         app = headless(tasks, assets);

@@ -36,7 +36,6 @@ use bevy::time::TimeUpdateStrategy;
 
 use crate::clock::WeatheringClock;
 use crate::output::remove_temporaries;
-use crate::overlay::SplatBudget;
 use crate::picture::PictureError;
 use crate::save::{ColorMaps, SaveError, SavedScene};
 use crate::scenario::{LoadedScenario, ScenarioError, ScenarioPlugin, ScenarioStatus, captures};
@@ -82,8 +81,6 @@ pub struct ReplayOptions {
     pub video: bool,
     /// Make a contact sheet of so many pictures, up to [`Self::MAX_SHEET`]. Needs `out` and `render`.
     pub sheet: Option<u32>,
-    /// What may be painted in a frame. All, since nobody waits for it; less gives the same maps, in more frames.
-    pub splat_budget: SplatBudget,
 }
 
 impl ReplayOptions {
@@ -108,7 +105,6 @@ impl ReplayOptions {
             every: None,
             video: false,
             sheet: None,
-            splat_budget: SplatBudget::UNLIMITED,
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::collision::ColliderReport;
 use crate::effect::EffectTable;
 use crate::emitter::{EmissionSeed, NewParticles};
 use crate::matter::SurfaceMatter;
-use crate::overlay::{MapLoss, MapPool, SplatStats, SurfaceTotals};
+use crate::overlay::{MapLoss, MapPool, SurfaceTotals};
 use crate::particle::{Particle, ParticleCounts, Particles, WaterCounts};
 use crate::scenario::{Digest, ExpectationOutcome, Expectations, ScenarioSurface, amounts_digest};
 use crate::wetting::{DripEffect, Stock, SurfaceWater, WettingStats};
@@ -58,8 +58,6 @@ pub struct ParticleReport {
     pub expired: u64,
     /// Not spawned, for want of room; not part of `emitted`.
     pub refused: u64,
-    /// Not spawned, since fewer carried as much ([`EmissionScale`](crate::emitter::EmissionScale)); not part of `emitted`.
-    pub held_back: u64,
 }
 
 /// One surface.
@@ -146,8 +144,6 @@ pub struct WorkReport {
     pub tiles_run: u64,
     /// Steps of tiles whose pores share water.
     pub tiles_spread: u64,
-    /// How often a splat was left for a later frame; see [`SplatBudget`](crate::overlay::SplatBudget).
-    pub splats_carried: u64,
 }
 
 /// Where the time went.
@@ -230,14 +226,12 @@ pub(super) fn report(
             hit: counts.hit,
             expired: counts.expired,
             refused: counts.refused,
-            held_back: counts.held_back,
         },
         water,
         work: WorkReport {
             drops: stats.drops(),
             tiles_run: stats.tiles_run(),
             tiles_spread: stats.tiles_spread(),
-            splats_carried: world.get_resource::<SplatStats>().map_or(0, SplatStats::carried),
         },
         maps: *world.resource::<MapPool>(),
         surfaces: surfaces.into_iter().map(|(_, row)| row).collect(),

@@ -10,7 +10,6 @@ mod maps;
 mod mips;
 mod pass;
 mod prepare;
-mod stats;
 
 use bevy::asset::embedded_asset;
 use bevy::core_pipeline::schedule::camera_driver;
@@ -24,8 +23,7 @@ use super::{SizeMaps, SplatQueue};
 
 pub use maps::Overlays;
 pub use mips::MipStep;
-pub use prepare::SurfaceBatch;
-pub use stats::{SplatBudget, SplatStats};
+pub use prepare::{SplatStats, SurfaceBatch};
 
 /// Paints splats with a compute pass. Needs a render app; without one it throws splats away. To keep what falls there,
 /// put [`CpuOverlayPlugin`](super::CpuOverlayPlugin) in its place.
@@ -43,7 +41,6 @@ impl Plugin for GpuOverlayPlugin {
         embedded_asset!(app, "../../../shaders/mips.wgsl");
 
         let stats = SplatStats::default();
-        app.register_type::<SplatBudget>().init_resource::<SplatBudget>();
         app.insert_resource(stats.clone()).add_observer(maps::release_overlays).add_systems(
             PreUpdate,
             // Of maps whose size has been decided; what has waited since the last tick gets its room at once.

@@ -1,6 +1,7 @@
 //! Splats on their way from the main world to the GPU.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use bevy::ecs::entity::EntityHashMap;
 use bevy::prelude::*;
@@ -17,7 +18,6 @@ use bevy::render::{Extract, MainWorld};
 use super::maps::Overlays;
 use super::mips::{MipBatches, MipPipeline, SurfaceLevels};
 use super::pass::SplatPipeline;
-use super::stats::{SplatBudget, SplatStats};
 use crate::overlay::{
     Lying, Splat, SplatQueue, StampAtlas, SurfaceFrames, TexelFrame, TileBins, TileHeader, Wrap,
 };
@@ -33,14 +33,55 @@ pub struct SurfaceBatch {
     pub clamped: UVec2,
 }
 
+/// What the pass has done since the start; the same numbers in the main and in the render world.
+#[derive(Resource, Clone, Default)]
+pub struct SplatStats(Arc<Counters>);
+
+#[derive(Default)]
+struct Counters {
+    splats: AtomicU64,
+    dispatches: AtomicU64,
+    tiles: AtomicU64,
+    dropped: AtomicU64,
+}
+
+impl SplatStats {
+    /// Splats painted.
+    pub fn splats(&self) -> u64 {
+        self.0.splats.load(Ordering::Relaxed)
+    }
+
+    /// Dispatches: one per surface and frame with new splats.
+    pub fn dispatches(&self) -> u64 {
+        self.0.dispatches.load(Ordering::Relaxed)
+    }
+
+    /// Tiles visited.
+    pub fn tiles(&self) -> u64 {
+        self.0.tiles.load(Ordering::Relaxed)
+    }
+
+    /// Splats that were dropped with the maps they were meant for.
+    pub fn dropped(&self) -> u64 {
+        self.0.dropped.load(Ordering::Relaxed)
+    }
+
+    fn drop_splats(&self, splats: usize) {
+        self.0.dropped.fetch_add(splats as u64, Ordering::Relaxed);
+    }
+
+    fn add(&self, splats: usize, tiles: usize) {
+        self.0.splats.fetch_add(splats as u64, Ordering::Relaxed);
+        self.0.tiles.fetch_add(tiles as u64, Ordering::Relaxed);
+        self.0.dispatches.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
 /// Splats in the render world that are not painted yet, by surface.
 #[derive(Resource, Default)]
 pub(super) struct PendingSplats {
     surfaces: Vec<PendingSurface>,
     by_entity: EntityHashMap<usize>,
-    budget: SplatBudget,
-    /// Whose turn it is first, so that a budget does not starve anyone.
-    first: usize,
 }
 
 struct PendingSurface {
@@ -53,28 +94,6 @@ struct PendingSurface {
     /// While the maps stay.
     levels: Option<SurfaceLevels>,
     splats: Vec<Splat>,
-    /// So many of them are painted.
-    painted: usize,
-}
-
-impl PendingSurface {
-    fn waiting(&self) -> &[Splat] {
-        &self.splats[self.painted..]
-    }
-
-    /// The first of those that wait are painted. Their memory is freed once they are the greater part.
-    fn paint(&mut self, count: usize) {
-        self.painted += count;
-        if 2 * self.painted >= self.splats.len() {
-            self.splats.drain(..self.painted);
-            self.painted = 0;
-        }
-    }
-
-    fn clear(&mut self) {
-        self.splats.clear();
-        self.painted = 0;
-    }
 }
 
 /// [`Overlays`] by name, so that nothing here keeps the maps of a surface that has gone or got others.
@@ -109,8 +128,7 @@ pub(super) fn extract_splats(
     >,
 ) {
     let query = query.get_or_insert_with(|| main_world.query());
-    pending.budget = main_world.get_resource().copied().unwrap_or_default();
-    let PendingSplats { surfaces, by_entity, .. } = &mut *pending;
+    let PendingSplats { surfaces, by_entity } = &mut *pending;
     for (entity, overlays, mut queue, frames) in query.iter_mut(&mut main_world) {
         // Levels hold on to their textures, also those that a surface has no more.
         if let Some(&index) = by_entity.get(&entity)
@@ -132,15 +150,14 @@ pub(super) fn extract_splats(
                 lying: None,
                 levels: None,
                 splats: Vec::new(),
-                painted: 0,
             });
             surfaces.len() - 1
         });
         let waiting = &mut surfaces[index];
         if waiting.maps.rings != overlays.rings.id() {
             // New maps: what was meant for the old ones is gone with them.
-            stats.drop_splats(waiting.waiting().len());
-            waiting.clear();
+            stats.drop_splats(waiting.splats.len());
+            waiting.splats.clear();
         }
         waiting.maps = overlays.into();
         let place = |frames: &SurfaceFrames| Arc::as_ptr(&frames.0);
@@ -156,7 +173,7 @@ pub(super) fn extract_splats(
         surfaces.retain(|waiting| {
             let gone = gone(waiting);
             if gone {
-                stats.drop_splats(waiting.waiting().len());
+                stats.drop_splats(waiting.splats.len());
             }
             !gone
         });
@@ -250,7 +267,7 @@ pub(super) fn prepare_splats(
     let SplatBatches { batches, splats, tiles, list, bins, no_frames, no_mask, frame, jobs } = &mut *batches;
     jobs.clear();
     mips.clear();
-    if pending.surfaces.iter().all(|surface| surface.waiting().is_empty())
+    if pending.surfaces.iter().all(|surface| surface.splats.is_empty())
         || cache.get_compute_pipeline(pipeline.pipeline).is_none()
         || cache.get_compute_pipeline(mip_pipeline.pipeline).is_none()
     {
@@ -260,14 +277,7 @@ pub(super) fn prepare_splats(
     splats.clear();
     tiles.clear();
     list.clear();
-    let PendingSplats { surfaces, budget, first, .. } = &mut *pending;
-    let (mut left, count) = (budget.splats.max(1) as usize, surfaces.len());
-    let start = *first % count;
-    for index in (start..count).chain(0..start) {
-        let waiting = &mut surfaces[index];
-        if waiting.waiting().is_empty() || left == 0 {
-            continue;
-        }
+    for waiting in pending.surfaces.iter_mut().filter(|surface| !surface.splats.is_empty()) {
         let Maps { size, wrap, images: [diffuse, specular, normal], rings } = waiting.maps;
         let (Some(diffuse), Some(specular), Some(normal), Some(rings)) =
             (images.get(diffuse), images.get(specular), images.get(normal), buffers.get(rings))
@@ -277,11 +287,8 @@ pub(super) fn prepare_splats(
         let first_tile = tiles.len() as u32;
         let first_splat = splats.len() as u32;
         let frames = waiting.frames.as_ref();
-        let due = &waiting.waiting()[..waiting.waiting().len().min(left)];
-        bins.bin(due, size, wrap, frames, first_splat, tiles.values_mut(), list.values_mut());
-        let in_space = due.iter().any(|splat| splat.in_space != 0);
-        splats.values_mut().extend_from_slice(due);
-        let painted = due.len();
+        bins.bin(&waiting.splats, size, wrap, frames, first_splat, tiles.values_mut(), list.values_mut());
+        let in_space = waiting.splats.iter().any(|splat| splat.in_space != 0);
         if in_space
             && waiting.frame_buffer.is_none()
             && let Some(frames) = frames
@@ -300,6 +307,7 @@ pub(super) fn prepare_splats(
             let lying = waiting.lying.as_ref().unwrap_or(no_mask);
             SurfaceLevels::new(maps, lying, masked, &mip_pipeline, &cache, &device)
         }));
+        splats.values_mut().extend_from_slice(&waiting.splats);
         let touched = tiles.len() as u32 - first_tile;
         mips.add(levels, size, &tiles.values()[first_tile as usize..]);
         let clamped = UVec2::from_array(wrap.map(|wrap| u32::from(wrap == Wrap::Clamp)));
@@ -318,14 +326,9 @@ pub(super) fn prepare_splats(
             batch_offset: batches.push(&SurfaceBatch { size, first_tile, clamped }),
             tiles: touched,
         });
-        stats.add(painted, touched as usize);
-        waiting.paint(painted);
-        left -= painted;
-        if left == 0 {
-            *first = index;
-        }
+        stats.add(waiting.splats.len(), touched as usize);
+        waiting.splats.clear();
     }
-    stats.carry(surfaces.iter().map(|surface| surface.waiting().len() as u64).sum());
     batches.write_buffer(&device, &queue);
     splats.write_buffer(&device, &queue);
     tiles.write_buffer(&device, &queue);
@@ -383,7 +386,7 @@ mod tests {
 
     fn pending(render: &World) -> Vec<u32> {
         let surfaces = &render.resource::<PendingSplats>().surfaces;
-        surfaces.iter().flat_map(|surface| surface.waiting()).map(|splat| splat.tick).collect()
+        surfaces.iter().flat_map(|surface| &surface.splats).map(|splat| splat.tick).collect()
     }
 
     #[test]
@@ -399,27 +402,6 @@ mod tests {
         }
         // Nothing was painted: all of it still waits, in order.
         assert_eq!(pending(&render), [0, 1, 2, 3, 4, 5, 6]);
-    }
-
-    #[test]
-    fn what_a_budget_leaves_keeps_its_order() {
-        let (mut render, surface) = worlds();
-        let mut schedule = Schedule::default();
-        schedule.add_systems(extract_splats);
-        let mut painted = Vec::new();
-        for frame in [0..7, 7..7, 7..20, 20..21] {
-            push(&mut render, surface, frame);
-            schedule.run(&mut render);
-            let waiting = &mut render.resource_mut::<PendingSplats>().surfaces[0];
-            let count = waiting.waiting().len().min(5);
-            painted.extend(waiting.waiting()[..count].iter().map(|splat| splat.tick));
-            waiting.paint(count);
-        }
-        painted.extend(pending(&render));
-        assert_eq!(painted, (0..21).collect::<Vec<_>>());
-        let waiting = &mut render.resource_mut::<PendingSplats>().surfaces[0];
-        waiting.paint(waiting.waiting().len());
-        assert!(waiting.splats.is_empty());
     }
 
     #[test]

@@ -2,14 +2,13 @@
 
 use bevy::prelude::*;
 use bevy_egui::egui;
-use bevy_weathering::emitter::{EmissionScale, Emitter, EmitterShape, EmitterState, Flow};
+use bevy_weathering::emitter::{Emitter, EmitterShape, EmitterState, Flow};
 use bevy_weathering::particle::{ParticleConfig, ParticleCounts};
 use bevy_weathering::scenario::{ByHand, SceneEntity};
 
 use super::effects;
 use super::hose::InHand;
 use super::split::CopyOf;
-use super::theme;
 use super::ui::{AddPanel, Place};
 use super::weather::OwnRain;
 use super::widgets::number;
@@ -24,12 +23,6 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     if counts.refused > 0 {
         let most = world.resource::<ParticleConfig>().max_alive;
         ui.label(format!("{} not sent: at most {most} may be in flight", counts.refused));
-    }
-    let scale = world.resource::<EmissionScale>().0;
-    if scale < 1.0 {
-        let text = format!("{:.1} % of the particles, each with the more water", 100.0 * scale);
-        ui.colored_label(theme::WARNING, text)
-            .on_hover_text("All of them would take longer than a tick has time");
     }
     // Those in the hand and over the scene have panels of their own.
     let mut query =

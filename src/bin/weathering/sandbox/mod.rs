@@ -38,7 +38,6 @@ use bevy::render::renderer::RenderAdapterInfo;
 use bevy::window::PrimaryWindow;
 use bevy_weathering::WeatheringPlugins;
 use bevy_weathering::effect::{EffectTable, WeatherEffect};
-use bevy_weathering::emitter::LiveBudgetPlugin;
 use bevy_weathering::replay::{require_adapter, task_pools};
 use bevy_weathering::scenario::{AssetTree, ScenarioPlugin};
 
@@ -79,7 +78,6 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
         .insert_resource(open::Opened { loaded, is_model, effects })
         .insert_resource(shots::OutFolder(arguments.out.clone()))
         .add_plugins((ui::plugin, settings::plugin, selection::plugin, camera::plugin))
-        .add_plugins(LiveBudgetPlugin)
         // In the order of their panels.
         .add_plugins((hose_and_time, scene_panels))
         .add_plugins((keys::plugin, title::plugin, open::plugin, model::plugin, saving::plugin))
