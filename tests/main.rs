@@ -40,6 +40,8 @@ mod gpu {
 mod layout;
 /// Dust, mud and snow.
 mod matter;
+/// More than a machine can do.
+mod overload;
 /// Skinned meshes in their pose.
 mod posed;
 /// The program as its users run it: output, errors, exit codes.

@@ -14,6 +14,7 @@
 //! ([`Wrap::Clamp`]).
 
 mod atlas;
+mod budget;
 mod cpu;
 pub mod deposit;
 mod frames;
@@ -31,6 +32,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use atlas::StampAtlas;
+pub use budget::SplatBudget;
 pub use cpu::{CpuMaps, CpuOverlayPlugin};
 pub(crate) use deposit::measure_texels;
 pub use deposit::{DepositPlugin, PrepareStamps, SplatQueue, SurfaceTotals, SurfaceTraces, deposit_splats};

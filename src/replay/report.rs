@@ -7,7 +7,7 @@ use super::{ReplayOptions, SurfaceMaps};
 use crate::clock::WeatheringClock;
 use crate::collision::ColliderReport;
 use crate::effect::EffectTable;
-use crate::emitter::{EmissionSeed, NewParticles};
+use crate::emitter::{EmissionSeed, EmitterState, NewParticles};
 use crate::overlay::SurfaceTotals;
 use crate::particle::{Particle, ParticleCounts, Particles, WaterCounts};
 use crate::scenario::{Digest, ExpectationOutcome, Expectations, ScenarioSurface, amounts_digest};
@@ -53,8 +53,10 @@ pub struct ParticleReport {
     pub hit: u64,
     /// Ran out of time.
     pub expired: u64,
-    /// Not spawned, for want of room; not part of `emitted`.
+    /// Not spawned, for want of room; not part of `emitted`. What they would carry is missing.
     pub refused: u64,
+    /// The same of emitters with a flow; others carry what they would.
+    pub merged: u64,
 }
 
 /// One surface.
@@ -120,6 +122,8 @@ pub struct WaterReport {
     pub missed_mm3: f64,
     /// Still in flight.
     pub in_flight_mm3: f64,
+    /// Not sent out yet, since a limit left no particle to take it along; no part of the sum.
+    pub held_mm3: f64,
     /// What the sum differs by, in parts of what came.
     pub imbalance: f64,
 }
@@ -146,6 +150,10 @@ pub struct Timing {
     pub total_seconds: f64,
     /// Pictures drawn, without those of the run that this one goes on with.
     pub frames: u32,
+    /// Splats that were painted in a later frame than that of their ticks, for want of [budget](ReplayOptions::splats).
+    pub carried_splats: u64,
+    /// Ticks that had to wait until what was there was painted.
+    pub held_ticks: u64,
 }
 
 impl Report {
@@ -210,6 +218,7 @@ pub(super) fn report(
             hit: counts.hit,
             expired: counts.expired,
             refused: counts.refused,
+            merged: counts.merged,
         },
         water,
         work: WorkReport {
@@ -227,6 +236,8 @@ pub(super) fn report(
 /// Adds up all water, wherever it is.
 fn water_report(world: &mut World, maps: &[SurfaceMaps]) -> WaterReport {
     let nl = |nl: u64| nl as f64 / 1000.0;
+    let mut emitters = world.query::<&EmitterState>();
+    let held_mm3 = emitters.iter(world).map(EmitterState::held_mm3).sum::<f64>() + 0.0;
     let sum = |of: &dyn Fn(&SurfaceMaps) -> u64| -> f64 {
         maps.iter().map(|maps| maps.water.units().mm3(of(maps))).sum::<f64>() + 0.0
     };
@@ -252,6 +263,7 @@ fn water_report(world: &mut World, maps: &[SurfaceMaps]) -> WaterReport {
         wiped_mm3: sum(&|maps| maps.water.ledger().wiped),
         missed_mm3: nl(expired(false)),
         in_flight_mm3: nl(in_flight),
+        held_mm3,
         imbalance: 0.0,
     };
     let found = report.on_surfaces_mm3

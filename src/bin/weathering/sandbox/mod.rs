@@ -13,6 +13,7 @@ use bevy::prelude::*;
 use bevy::render::renderer::RenderAdapterInfo;
 use bevy_weathering::WeatheringPlugins;
 use bevy_weathering::effect::WeatherEffect;
+use bevy_weathering::overload::LiveBudgetPlugin;
 use bevy_weathering::replay::{require_adapter, task_pools};
 use bevy_weathering::scenario::{Scenario, ScenarioPlugin, ScenarioStatus};
 
@@ -43,6 +44,7 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
                 }),
         )
         .add_plugins(WeatheringPlugins)
+        .add_plugins(LiveBudgetPlugin)
         .add_plugins(scenario)
         .insert_resource(ScreenshotFolder(arguments.out.clone()))
         .insert_resource(title::ScenarioName(arguments.file.display().to_string()))
