@@ -111,7 +111,7 @@ impl Default for ClockPlugin {
 
 impl Plugin for ClockPlugin {
     fn build(&self, app: &mut App) {
-        self.insert_clock(app);
+        self.insert_clock(app.world_mut());
         app.register_type::<ShownTime>().init_resource::<ShownTime>();
         // Every stage of a tick sees its number.
         app.add_systems(WeatheringTick, advance_clock.before(WeatheringSystems::First));
@@ -120,9 +120,10 @@ impl Plugin for ClockPlugin {
 
 impl ClockPlugin {
     /// Sets the clock of an app that has the plugin already.
-    pub(crate) fn insert_clock(&self, app: &mut App) {
+    pub(crate) fn insert_clock(&self, world: &mut World) {
         let clock = WeatheringClock::new(self.hz);
-        app.insert_resource(Time::<Fixed>::from_hz(f64::from(clock.hz()))).insert_resource(clock);
+        world.insert_resource(Time::<Fixed>::from_hz(f64::from(clock.hz())));
+        world.insert_resource(clock);
     }
 }
 

@@ -36,7 +36,7 @@ pub mod prelude {
     pub use crate::effect::WeatherEffect;
     pub use crate::emitter::{Emitter, EmitterShape, Flow};
     pub use crate::material::{PorousMaterial, StandingWater, WettingModel};
-    pub use crate::overlay::{OverlayUv, Weatherable, Wrap};
+    pub use crate::overlay::{MapBudget, OverlayUv, Weatherable, Wrap};
     pub use crate::overload::{LiveBudget, LiveBudgetPlugin};
     pub use crate::particle::Forces;
     pub use crate::schedule::{WeatheringSystems, WeatheringTick};

@@ -40,8 +40,12 @@ mod gpu {
 mod layout;
 /// Dust, mud and snow.
 mod matter;
+/// What a replay makes of its numbers and pictures, and many replays at once.
+mod outputs;
 /// More than a machine can do.
 mod overload;
+/// One budget for the maps of all surfaces.
+mod pool;
 /// Skinned meshes in their pose.
 mod posed;
 /// The program as its users run it: output, errors, exit codes.

@@ -12,8 +12,8 @@ use tempfile::TempDir;
 const HOSE: &str = "assets/scenarios/hose.ron";
 const VASE: &str = "assets/scenarios/vase.ron";
 
-/// A tap over a square metre of ground: what [`Tree`] holds, and what its copies spoil.
-const TAP: &str = r#"(
+/// A tap over a square metre of ground: what [`Tree`] holds, what its copies spoil, and what is run many times.
+pub const TAP: &str = r#"(
     seconds: 1.0,
     max_particles: 1000,
     camera: (keys: [(eye: (0.0, 1.0, 2.0), target: (0.0, 0.0, 0.0))]),
@@ -134,7 +134,10 @@ fn expected_files(surfaces: &[&str], frames: u32) -> BTreeSet<String> {
     let maps = ["diffuse", "specular", "normal", "film", "absorbed", "wetness", "since"];
     let maps = surfaces.iter().flat_map(|name| maps.map(|map| format!("maps/{name}_{map}.png")));
     let frames = (0..frames).map(|frame| format!("frame_{frame:05}.png"));
-    maps.chain(frames).chain(["report.json".into()]).collect()
+    let plots = ["wetness", "film", "absorbed", "water", "particles", "timings"];
+    let plots = plots.map(|plot| format!("plots/{plot}.svg"));
+    let tables = ["report.json", "series.csv", "timings.csv"].map(String::from);
+    maps.chain(frames).chain(plots).chain(tables).collect()
 }
 
 /// A 16-bit map.
@@ -373,6 +376,10 @@ fn bad_scenarios_are_refused_by_file_field_and_value() {
         ("scale: (1.0, 1.0, 1.0)", "scale: (1.0, 0.0, 1.0)", &["`surfaces[0].scale`", "[1, 0, 1]"]),
         ("scale: (1.0, 1.0, 1.0)", "scale: (1.0, NaN, 1.0)", &["`surfaces[0].scale.y`", "NaN"]),
         ("map_size: 256", "map_size: 100000", &["`surfaces[0].maps.map_size`", "100000"]),
+        ("seconds: 1.0", "seconds: 1.0, map_budget: (mib: 0.0)", &["`map_budget.mib`", "above 0"]),
+        ("seconds: 1.0", "seconds: 1.0, map_budget: (mib: 70000.0)", &["`map_budget.mib`", "70000"]),
+        ("seconds: 1.0", "seconds: 1.0, map_budget: (texel_mm: NaN)", &["`map_budget.texel_mm`", "NaN"]),
+        ("seconds: 1.0", "seconds: 1.0, map_budget: (bytes: 3)", &[":2:", "`bytes`"]),
         ("map_size: 256", "map_size: 100", &["`surfaces[0].maps.map_size`", "100"]),
         ("(2, 2)", "(0, 2)", &["`surfaces[0].mesh`", "0 triangles"]),
         ("(2, 2)", "(100000, 100000)", &["`surfaces[0].mesh`", "20000000000 triangles"]),
@@ -407,6 +414,23 @@ fn bad_scenarios_are_refused_by_file_field_and_value() {
     // Without the fault it runs.
     run(replay(tree.tap(), "--no-render --out").arg(&out)).assert_success();
     assert!(out.exists());
+}
+
+#[test]
+fn a_surface_without_room_for_its_maps_is_told_of_and_accounted_for() {
+    let tree = Tree::new();
+    let out = tree.path("out");
+    for (budget, side) in [("(mib: 0.001)", 0), ("(texel_mm: 10.0)", 112), ("(mib: 0.5)", 128), ("()", 256)] {
+        let file = tree.spoilt("seconds: 1.0", &format!("seconds: 1.0, map_budget: {budget}"));
+        run(replay(&file, "--no-render --out").arg(&out)).assert_success();
+        let report = read_report(&out);
+        assert_eq!(surfaces(&report)[0]["map_size"], side, "{budget}");
+        assert_eq!(report["maps"]["refusals"], u32::from(side == 0), "{budget}");
+        let water = &report["water"];
+        assert_eq!(number(&water["evicted_mm3"]) > 0.0, side == 0, "{budget}: {water}");
+        assert!(number(&water["imbalance"]).abs() < 1e-9, "{budget}: {water}");
+        assert_eq!(out.join("maps/ground_film.png").exists(), side > 0, "{budget}");
+    }
 }
 
 #[test]

@@ -103,6 +103,8 @@ fn keys_pause_start_over_take_pictures_and_leave() {
             .arg(&out)
             .env("DISPLAY", &display)
             .env("XDG_RUNTIME_DIR", folder.path())
+            // Not the settings of whoever runs the test, and not into them.
+            .env("XDG_CONFIG_HOME", folder.path().join("config"))
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
@@ -145,14 +147,18 @@ fn keys_pause_start_over_take_pictures_and_leave() {
     state("paused");
     xdotool(&["key", "r"]);
     wait_for("the dry floor", || (take().as_raw() == dry.as_raw()).then_some(()));
-    // Dragging turns the camera.
-    xdotool(&["mousemove", "300", "200", "mousedown", "1"]);
+    // Dragging with the right button turns the camera.
+    xdotool(&["mousemove", "600", "250", "mousedown", "3"]);
     for _ in 0..8 {
         xdotool(&["mousemove_relative", "12", "4"]);
         std::thread::sleep(Duration::from_millis(60));
     }
-    xdotool(&["mouseup", "1"]);
+    xdotool(&["mouseup", "3"]);
     wait_for("the camera to turn", || (take().as_raw() != dry.as_raw()).then_some(()));
+    // Over a panel it does not.
+    let turned = take();
+    xdotool(&["mousemove", "100", "250", "mousedown", "3", "mousemove_relative", "60", "20", "mouseup", "3"]);
+    assert!(take().as_raw() == turned.as_raw(), "the camera turned over a panel");
     xdotool(&["key", "Escape"]);
     let status = wait_for("the end", || sandbox.0.try_wait().unwrap());
     assert!(status.success(), "{status}");

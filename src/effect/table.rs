@@ -48,7 +48,7 @@ impl EffectRow {
     }
 }
 
-/// All effects in use, in the order of their first use. Rows are never removed, so an index stays true.
+/// All effects in use, in the order of their first use. No row is removed while there are particles, so an index stays true.
 #[derive(Resource, Debug, Default)]
 pub struct EffectTable {
     rows: Vec<EffectRow>,
@@ -93,6 +93,11 @@ impl EffectTable {
         let index = self.index_of(&handle)?;
         self.rows[usize::from(index.0)].set(effect);
         Some(index)
+    }
+
+    /// Forgets the rows behind the first `rows`: there must be no particle of theirs any more.
+    pub(crate) fn truncate(&mut self, rows: usize) {
+        self.rows.truncate(rows);
     }
 
     /// Copies what has been loaded or changed into the rows.

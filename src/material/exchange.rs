@@ -13,7 +13,7 @@ use super::{
 use crate::clock::WeatheringClock;
 use crate::collision::UvSet;
 use crate::matter::MatterLook;
-use crate::overlay::{Overlays, SurfaceTraces, TexelArea, Weatherable};
+use crate::overlay::{MapSize, Overlays, SurfaceTraces, TexelArea, Weatherable};
 
 /// The material a weathered entity had. Its asset may go on being edited: the weathered form follows.
 #[derive(Component, Reflect, Debug, Clone)]
@@ -110,9 +110,10 @@ pub(super) fn exchange_materials(
     }
 }
 
-/// Gives a surface that is not [`Weatherable`] any more its dry material back.
+/// Gives a surface that has no maps any more, or is not [`Weatherable`] any more, its dry material back: the weathered one
+/// would keep its maps.
 pub(super) fn release_surface(
-    removed: On<Remove, Weatherable>,
+    removed: On<Remove, MapSize>,
     mut commands: Commands,
     dry: Query<&DryMaterial>,
 ) {

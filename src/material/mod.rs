@@ -47,7 +47,7 @@ pub use porous::{
     BaseBrdf, Coated, Grains, Pores, PorositySource, PorousMaterial, TextureMeaning, Tweaked, WetLook,
     WettingModel, WettingTextures,
 };
-pub use ranges::OutOfRange;
+pub use ranges::{OutOfRange, range_of};
 pub use standing::{Flood, StandingWater};
 pub use warm_up::Understudy;
 

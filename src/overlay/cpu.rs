@@ -7,7 +7,7 @@ use super::kernel::{
     axis_offset, blend_over, depth_part, dot_axes, facing_part, falloff, framed, lay_stamp, slope_color,
     slope_of, stamp_alpha, stamp_slope, turned, unpack_axis,
 };
-use super::{Splat, SplatQueue, StampAtlas, TILE_SIZE, Weatherable, Wrap};
+use super::{MapSize, Splat, SplatQueue, StampAtlas, TILE_SIZE, Weatherable, Wrap};
 use crate::schedule::{WeatheringSystems, WeatheringTick};
 use crate::stamps::StampTexel;
 use crate::stamps::sample::{mix4, on_stamp, stamp_corners};
@@ -28,13 +28,17 @@ pub struct CpuMaps {
 }
 
 impl CpuMaps {
-    /// Empty maps for a surface.
+    /// Empty maps for a surface, as large as it allows.
     pub fn new(surface: &Weatherable) -> Self {
-        let size = surface.texels();
+        Self::of_size(surface.texels(), surface.wrap())
+    }
+
+    /// Empty maps with so many texels along each side, and these edges.
+    pub fn of_size(size: u32, wrap: [Wrap; 2]) -> Self {
         let texels = (size * size) as usize;
         Self {
             size,
-            wrap: surface.wrap(),
+            wrap,
             diffuse: vec![[0; 4]; texels],
             specular: vec![[0; 4]; texels],
             normal: vec![[0; 4]; texels],
@@ -167,7 +171,7 @@ pub struct CpuOverlayPlugin;
 
 impl Plugin for CpuOverlayPlugin {
     fn build(&self, app: &mut App) {
-        app.add_systems(
+        app.add_observer(release_maps).add_systems(
             WeatheringTick,
             (
                 add_cpu_maps.before(super::deposit_splats),
@@ -181,16 +185,25 @@ impl Plugin for CpuOverlayPlugin {
 /// Gives new surfaces their maps, and new ones when their size or edges change.
 fn add_cpu_maps(
     mut commands: Commands,
-    mut changed: Query<(Entity, &Weatherable, Option<&CpuMaps>, &mut SplatQueue), Changed<Weatherable>>,
+    mut changed: Query<
+        (Entity, &Weatherable, &MapSize, Option<&CpuMaps>, &mut SplatQueue),
+        Or<(Changed<Weatherable>, Changed<MapSize>)>,
+    >,
 ) {
-    for (entity, surface, maps, mut queue) in &mut changed {
-        if maps.is_none_or(|maps| (maps.size, maps.wrap) != (surface.texels(), surface.wrap())) {
+    for (entity, surface, size, maps, mut queue) in &mut changed {
+        let (size, wrap) = (size.texels(), surface.wrap());
+        if maps.is_none_or(|maps| (maps.size, maps.wrap) != (size, wrap)) {
             if maps.is_some() {
                 queue.clear();
             }
-            commands.entity(entity).insert(CpuMaps::new(surface));
+            commands.entity(entity).insert(CpuMaps::of_size(size, wrap));
         }
     }
+}
+
+/// Drops the maps of a surface that has lost its size.
+fn release_maps(removed: On<Remove, MapSize>, mut commands: Commands) {
+    commands.entity(removed.entity).try_remove::<CpuMaps>();
 }
 
 /// Empties every queue into its surface's maps. Surfaces do not share texels, so they are painted in parallel.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::frames::{FramesWork, SurfaceFrames, measure_frames, release_frames};
 use super::site::Site;
 use super::stamping::{splat_from_impact, unit_hash};
-use super::{Splat, StampAtlas, StampSpace, TexelArea, Weatherable};
+use super::{MapLoss, MapSize, SizeMaps, Splat, StampAtlas, StampSpace, TexelArea, Weatherable, pool};
 use crate::clock::WeatheringClock;
 use crate::collision::{DeformingCollider, Impact, Impacts, SurfaceCollider};
 use crate::effect::drops::splashes;
@@ -80,6 +80,9 @@ pub struct SurfaceTotals {
     pub impacts: u64,
     /// Water they carried, nanolitres.
     pub water_nl: u64,
+    /// Tick of the last of them; 0 for none.
+    #[serde(default)]
+    pub last_tick: u32,
 }
 
 /// In `PreUpdate`, after surfaces have learnt their shape: stamps get their numbers, and surfaces learn where their texels lie.
@@ -91,6 +94,7 @@ pub struct DepositPlugin;
 
 impl Plugin for DepositPlugin {
     fn build(&self, app: &mut App) {
+        pool::plugin(app);
         app.register_type::<Weatherable>()
             .register_type::<SurfaceTotals>()
             .register_type::<SurfaceTraces>()
@@ -101,7 +105,9 @@ impl Plugin for DepositPlugin {
             .register_type::<StampSpace>()
             .init_resource::<FramesWork>()
             .add_observer(release_frames)
-            .add_systems(PreUpdate, measure_texels)
+            .add_observer(release_texels)
+            // Of maps whose size has been decided.
+            .add_systems(PreUpdate, measure_texels.after(SizeMaps))
             .add_systems(
                 PreUpdate,
                 (number_stamps.after(RefreshEffects), measure_frames.after(MeasureSurfaces))
@@ -118,14 +124,19 @@ impl Plugin for DepositPlugin {
 pub(crate) fn measure_texels(
     mut commands: Commands,
     changed: Query<
-        (Entity, &Weatherable, &SurfaceCollider, &GlobalTransform),
-        Or<(Changed<Weatherable>, Changed<SurfaceCollider>)>,
+        (Entity, &MapSize, &SurfaceCollider, &GlobalTransform),
+        Or<(Changed<Weatherable>, Changed<MapSize>, Changed<SurfaceCollider>)>,
     >,
 ) {
-    for (entity, surface, collider, transform) in &changed {
-        let area = TexelArea::new(collider.0.triangles(), &transform.affine(), surface.texels());
+    for (entity, size, collider, transform) in &changed {
+        let area = TexelArea::new(collider.0.triangles(), &transform.affine(), size.texels());
         commands.entity(entity).insert(area);
     }
+}
+
+/// A surface without maps has no texels.
+fn release_texels(removed: On<Remove, MapSize>, mut commands: Commands) {
+    commands.entity(removed.entity).try_remove::<TexelArea>();
 }
 
 /// Tells those who draw what has come.
@@ -151,9 +162,11 @@ type Stamped = (
     Option<&'static SurfaceFrames>,
     Option<&'static GlobalTransform>,
     Option<&'static DeformingCollider>,
+    Option<&'static MapSize>,
+    Option<&'static mut MapLoss>,
 );
 
-/// Turns this tick's impacts into splats, in their order.
+/// Turns this tick's impacts into splats, in their order. What falls on a surface without maps is entered as lost.
 pub fn deposit_splats(
     clock: Res<WeatheringClock>,
     impacts: Res<Impacts>,
@@ -165,21 +178,30 @@ pub fn deposit_splats(
 ) {
     let room = config.max_alive as usize - particles.len().min(config.max_alive as usize);
     for impact in &impacts.0 {
-        let Ok((surface, mut queue, mut totals, drops, matter, frames, transform, deforming)) =
+        let Ok((surface, mut queue, mut totals, drops, matter, frames, transform, deforming, size, loss)) =
             surfaces.get_mut(impact.surface)
         else {
             continue;
         };
         let Some(row) = effects.row(impact.effect) else { continue };
         let Some(effect) = &row.effect else { continue };
-        totals.impacts += 1;
+        (totals.impacts, totals.last_tick) = (totals.impacts + 1, clock.tick());
         let (water_nl, solid_nl) = effect.carries.parts_nl(impact.volume_nl);
         let water_nl = water_nl - throw_up(impact, row, effect, water_nl, &clock, room, &mut new);
         totals.water_nl += u64::from(water_nl);
+        let Some(size) = size else {
+            if let Some(mut loss) = loss {
+                let is_snow = effect.carries == Carries::Snow;
+                let (soil_nl, snow_nl) = if is_snow { (0, solid_nl) } else { (solid_nl, 0) };
+                loss.turn_away_impact(water_nl, soil_nl, snow_nl);
+            }
+            continue;
+        };
+        let map = (size.texels(), surface.wrap());
         let site = frames
             .zip(transform)
             .and_then(|(frames, transform)| Site::of(impact, &frames.0, transform, deforming));
-        let splat = splat_from_impact(impact, row, effect, surface, site.as_ref(), clock.tick(), water_nl);
+        let splat = splat_from_impact(impact, row, effect, map, site.as_ref(), clock.tick(), water_nl);
         queue.push(splat);
         if let Some(mut matter) = matter
             && let Some(kind) = kind_of(effect.carries)
@@ -303,13 +325,18 @@ mod tests {
         world.init_resource::<NewParticles>();
         let mut spawn =
             || world.spawn((Weatherable::default(), SplatQueue::default(), SurfaceTotals::default())).id();
-        let (one, other) = (spawn(), spawn());
+        let (one, other, bare) = (spawn(), spawn(), spawn());
+        for mapped in [one, other] {
+            world.entity_mut(mapped).insert(MapSize::whole(&Weatherable::default()));
+        }
+        world.entity_mut(bare).insert(MapLoss::default());
         let gone = world.spawn_empty().id();
         world.insert_resource(Impacts(vec![
             impact(one, 4),
             impact(other, 5),
             impact(gone, 6),
             impact(one, 7),
+            impact(bare, 8),
         ]));
 
         let mut schedule = Schedule::default();
@@ -317,8 +344,14 @@ mod tests {
         schedule.run(&mut world);
 
         let totals = |surface| *world.get::<SurfaceTotals>(surface).unwrap();
-        assert_eq!(totals(one), SurfaceTotals { impacts: 2, water_nl: 8380 });
-        assert_eq!(totals(other), SurfaceTotals { impacts: 1, water_nl: 4190 });
+        assert_eq!(totals(one), SurfaceTotals { impacts: 2, water_nl: 8380, last_tick: 1 });
+        assert_eq!(totals(other), SurfaceTotals { impacts: 1, water_nl: 4190, last_tick: 1 });
+        // Without maps: counted, but not kept.
+        assert_eq!(totals(bare), totals(other));
+        assert!(world.get::<SplatQueue>(bare).unwrap().is_empty());
+        let lost = MapLoss::UNITS.from_nl(4190);
+        let expected = MapLoss { unpainted: 1, received: lost, water: lost, ..default() };
+        assert_eq!(world.get::<MapLoss>(bare), Some(&expected));
         let splat = world.get::<SplatQueue>(other).unwrap().splats()[0];
         assert_eq!(splat.center, [256 * 256, 128 * 256]);
         assert_eq!(splat.radius, [32 * 256, 16 * 256]);

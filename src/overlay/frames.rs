@@ -9,7 +9,7 @@ use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use bytemuck::{Pod, Zeroable};
 
 use super::kernel::{cross_axes, unpack_axis};
-use super::{StampSpace, TILE_SIZE, Weatherable, Wrap};
+use super::{MapSize, StampSpace, TILE_SIZE, Weatherable, Wrap};
 use crate::collision::{BoxOverlaps, MeshTriangles, SurfaceCollider};
 use crate::effect::{EffectTable, WeatherEffect};
 use crate::wetting::{TexelGeometry, TexelLayout, WetGeometry, surface_points};
@@ -225,8 +225,8 @@ pub(super) fn measure_frames(
     }
 }
 
-/// A surface that is not [`Weatherable`] any more has no marks any more.
-pub(super) fn release_frames(removed: On<Remove, Weatherable>, mut commands: Commands) {
+/// A surface without maps has no marks any more.
+pub(super) fn release_frames(removed: On<Remove, MapSize>, mut commands: Commands) {
     commands.entity(removed.entity).try_remove::<SurfaceFrames>();
 }
 

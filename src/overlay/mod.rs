@@ -12,6 +12,9 @@
 //! # Wraparound
 //! A stamp over the edge of the map continues at the opposite edge ([`Wrap::Repeat`]) or ends there
 //! ([`Wrap::Clamp`]).
+//!
+//! # How large maps are
+//! All maps share a [`MapBudget`]. A surface has none until that gives it a [`MapSize`] (`pool`).
 
 mod atlas;
 mod budget;
@@ -22,6 +25,7 @@ mod gpu;
 pub mod kernel;
 mod maps;
 mod mips;
+mod pool;
 mod site;
 mod splat;
 mod stamping;
@@ -42,6 +46,7 @@ pub use gpu::{GpuOverlayPlugin, MipStep, Overlays, SplatStats, SurfaceBatch};
 pub(crate) use maps::Footprint;
 pub use maps::{RainRing, TexelArea, TexelAreas};
 pub use mips::{Lying, mip_chain, mip_levels};
+pub use pool::{MapBudget, MapLoss, MapNeed, MapPool, MapSize, SizeMaps, SurfaceEvicted, Unmapped};
 pub use splat::Splat;
 pub use tiles::{TILE_SIZE, TileBins, TileHeader};
 
@@ -53,7 +58,8 @@ pub use tiles::{TILE_SIZE, TileBins, TileHeader};
 #[reflect(Component)]
 #[serde(deny_unknown_fields, default)]
 pub struct Weatherable {
-    /// Texels along each side of the maps; a multiple of [`TILE_SIZE`] from 16 to [`Self::MAX_MAP_SIZE`].
+    /// The most texels along each side of the maps; a multiple of [`TILE_SIZE`] from 16 to [`Self::MAX_MAP_SIZE`]. As many
+    /// as there are, unless [`MapBudget`] makes do with fewer: see [`MapSize`].
     pub map_size: u32,
     /// What happens at the left and right edge of the maps.
     pub wrap_u: Wrap,

@@ -7,7 +7,7 @@ use bytemuck::Zeroable;
 use super::frames::pack_axis;
 use super::site::Site;
 use super::splat::pack_unorm;
-use super::{Splat, Weatherable};
+use super::{Splat, Wrap};
 use crate::collision::Impact;
 use crate::effect::drops::{drop_mm3, spread_mm};
 use crate::effect::{EffectRow, StampTurn, WeatherEffect};
@@ -58,17 +58,16 @@ impl Axes {
     }
 }
 
-/// The stamp of an impact.
+/// The stamp of an impact, on maps of this size with these edges.
 pub(super) fn splat_from_impact(
     impact: &Impact,
     row: &EffectRow,
     effect: &WeatherEffect,
-    surface: &Weatherable,
+    (size, wrap): (u32, [Wrap; 2]),
     site: Option<&Site>,
     tick: u32,
     water_nl: u32,
 ) -> Splat {
-    let size = surface.texels();
     let own = radius(impact, effect, row);
     // What flies in aslant is drawn out along its flight.
     let steepness = impact.velocity.normalize_or_zero().dot(impact.normal).abs();
@@ -79,7 +78,7 @@ pub(super) fn splat_from_impact(
     let (first, count) = row.stamps;
     let stamp = if count == 0 { 0 } else { first + hash(impact.sequence.0 ^ 0x5bd1_e995) % count };
     let mut splat = Splat {
-        center: Splat::center_from_uv(impact.uv, size, surface.wrap()),
+        center: Splat::center_from_uv(impact.uv, size, wrap),
         radius: Splat::radius_from_uv(impact.uv_per_metre * long, size),
         water_nl,
         tick,
@@ -158,7 +157,6 @@ mod tests {
     use super::*;
     use crate::collision::MeshTriangles;
     use crate::effect::{EffectIndex, EffectTable};
-    use crate::overlay::Wrap;
     use crate::particle::Sequence;
     use crate::wetting::TexelGeometry;
 
@@ -184,8 +182,8 @@ mod tests {
         let mut table = EffectTable::default();
         table.insert(Handle::default(), effect);
         let row = &table.rows()[0];
-        let surface = Weatherable { map_size: 64, wrap_u: Wrap::Clamp, wrap_v: Wrap::Clamp, ..default() };
-        splat_from_impact(impact, row, row.effect.as_ref().unwrap(), &surface, site, 1, impact.volume_nl)
+        let effect = row.effect.as_ref().unwrap();
+        splat_from_impact(impact, row, effect, (64, [Wrap::Clamp; 2]), site, 1, impact.volume_nl)
     }
 
     fn paint(stamp_radius: f32) -> WeatherEffect {

@@ -1,10 +1,14 @@
 //! The folder that a replay writes into.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::ReplayError;
 use super::maps::MAP_NAMES;
+use super::plots::{PLOT_FILES, PLOTS_FOLDER};
+use super::series::{SERIES_FILE, TIMINGS_FILE};
+use super::sheet::SHEET_FILE;
+use super::video::{ANIMATION_FILE, VIDEO_FILE};
 use crate::output::{self, temporary_beside};
 
 /// Writes under a temporary name beside `path` and renames; makes missing folders. On an error nothing is left.
@@ -66,9 +70,84 @@ pub(super) fn remove_earlier_run(folder: &Path, first: u32, kept: &[String]) -> 
     Ok(())
 }
 
+/// Tells that all of a folder is there, and what it was made from: written last, removed first.
+pub const DONE_FILE: &str = "done.json";
+
+/// Removes what was made of an earlier run's pictures and numbers, the mark that it is done before all else, and what a run
+/// that was killed has left half-written.
+///
+/// # Errors
+/// [`ReplayError::Write`] with the file.
+pub(super) fn remove_earlier_outputs(folder: &Path) -> Result<(), ReplayError> {
+    let made = [DONE_FILE, SERIES_FILE, TIMINGS_FILE, VIDEO_FILE, ANIMATION_FILE, SHEET_FILE];
+    let plots = folder.join(PLOTS_FOLDER);
+    let files = made.map(|file| folder.join(file)).into_iter().chain(PLOT_FILES.map(|file| plots.join(file)));
+    let maps = folder.join("maps");
+    let folders: [&Path; 3] = [folder, &maps, &plots];
+    let half_written = folders.into_iter().flat_map(temporaries);
+    for path in files.chain(half_written) {
+        match fs::remove_file(&path) {
+            Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+                return Err(ReplayError::Write { path, source });
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// What [`write_atomic`] leaves in a folder if it is killed.
+fn temporaries(folder: &Path) -> Vec<PathBuf> {
+    let is_temporary = |name: &str| name.len() == 11 && name.starts_with('.') && name.ends_with(".tmp");
+    let entries = fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
+    entries
+        .filter(|entry| entry.file_name().to_str().is_some_and(is_temporary))
+        .map(|entry| entry.path())
+        .collect()
+}
+
+/// The numbers and files of all pictures in a folder, in order.
+pub(super) fn frames(folder: &Path) -> Vec<(u32, PathBuf)> {
+    let number = |name: &str| name.strip_prefix("frame_")?.strip_suffix(".png")?.parse::<u32>().ok();
+    let entries = fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
+    let mut frames: Vec<(u32, PathBuf)> =
+        entries.filter_map(|entry| Some((number(entry.file_name().to_str()?)?, entry.path()))).collect();
+    frames.sort();
+    frames
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_was_made_of_an_earlier_run_is_removed_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let made = ["done.json", "series.csv", "timings.csv", "video.mp4", "video.apng", "sheet.png"];
+        let below = ["plots/film.svg", ".a1B2c3.tmp", "maps/.ABCDEF.tmp", "plots/.123456.tmp"];
+        let others = ["my.csv", "plots/mine.svg", ".tmp", ".swap.file.tmp", "frame_00000.png"];
+        for name in made.iter().chain(&below).chain(&others) {
+            write_atomic(&folder.path().join(name), b"x").unwrap();
+        }
+        remove_earlier_outputs(folder.path()).unwrap();
+        assert!(made.iter().chain(&below).all(|name| !folder.path().join(name).exists()));
+        assert!(others.iter().all(|name| folder.path().join(name).exists()));
+        remove_earlier_outputs(&folder.path().join("nowhere")).unwrap();
+        // A temporary file is recognised as one.
+        let temporary = temporary_beside(&folder.path().join("a.png")).unwrap();
+        assert_eq!(temporaries(folder.path()), [temporary.path()]);
+    }
+
+    #[test]
+    fn pictures_are_found_in_their_order() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["frame_00010.png", "frame_00002.png", "frame_100000.png", "frame_x.png", "sheet.png"] {
+            write_atomic(&folder.path().join(name), b"x").unwrap();
+        }
+        let numbers: Vec<u32> = frames(folder.path()).into_iter().map(|(number, _)| number).collect();
+        assert_eq!(numbers, [2, 10, 100_000]);
+        assert!(frames(&folder.path().join("nowhere")).is_empty());
+    }
 
     #[test]
     fn what_is_written_is_whole_and_alone() {

@@ -11,7 +11,7 @@ use super::{ReplayError, Run, give_up_after};
 use crate::clock::WeatheringClock;
 use crate::material::PorousMaterial;
 use crate::matter::SurfaceMatter;
-use crate::overlay::{CpuMaps, Overlays, SplatQueue, SplatStats, Weatherable};
+use crate::overlay::{CpuMaps, MapLoss, MapSize, Overlays, SplatQueue, SplatStats, TILE_SIZE, Weatherable};
 use crate::picture::{square, write_picture};
 use crate::scenario::ScenarioSurface;
 use crate::weather::DryingClock;
@@ -23,7 +23,7 @@ use crate::wetting::{Exposure, Now, Stock, SurfaceWater, WetGeometry, Wetness};
 pub struct SurfaceMaps {
     /// The surface's name in the scenario.
     pub name: String,
-    /// Texels along each side.
+    /// Texels along each side; 0 if it has no maps, for want of room. Then nothing lies on it, and there are no texels.
     pub size: u32,
     /// Colour over the surface's; premultiplied RGBA, row by row.
     pub diffuse: Vec<u8>,
@@ -43,8 +43,31 @@ pub struct SurfaceMaps {
     pub stock: Stock,
     /// Its dust, mud and snow.
     pub matter: SurfaceMatter,
+    /// What was lost with maps that were taken away, and for want of maps.
+    pub loss: MapLoss,
     /// Ticks per second of `since`.
     pub hz: u32,
+}
+
+impl SurfaceMaps {
+    /// Of a surface that has none.
+    fn none(name: String, surface: &Weatherable, loss: MapLoss, hz: u32) -> Self {
+        Self {
+            name,
+            size: 0,
+            diffuse: vec![],
+            specular: vec![],
+            normal: vec![],
+            wetness: vec![],
+            since: vec![],
+            wet_fraction: 0.0,
+            water: SurfaceWater::of_size(TILE_SIZE, surface.wrap(), 1.0),
+            stock: Stock::default(),
+            matter: SurfaceMatter::default(),
+            loss,
+            hz,
+        }
+    }
 }
 
 /// What has been read back so far: (surface, map, bytes).
@@ -61,21 +84,28 @@ impl Run<'_> {
         let drying = self.app.world().resource::<DryingClock>().clone();
         let world = self.app.world_mut();
         let mut query = world.query::<(
-            (Entity, &ScenarioSurface, &Weatherable, &SurfaceWater, &WetGeometry),
-            (Option<&Exposure>, Option<&PorousMaterial>, Option<&CpuMaps>, Option<&Overlays>, &SurfaceMatter),
+            (Entity, &ScenarioSurface, &Weatherable, &MapLoss, &SurfaceMatter),
+            (Option<&MapSize>, Option<&SurfaceWater>, Option<&WetGeometry>),
+            (Option<&Exposure>, Option<&PorousMaterial>, Option<&CpuMaps>, Option<&Overlays>),
         )>();
         let mut surfaces = Vec::new();
         let mut requests = Vec::new();
         let default = PorousMaterial::default();
-        for ((entity, surface, maps, water, geometry), (exposure, material, cpu, gpu, matter)) in
+        for ((entity, surface, settings, loss, matter), measured, (exposure, material, cpu, gpu)) in
             query.iter(world)
         {
+            let (Some(size), Some(water), Some(geometry)) = measured else {
+                let read = SurfaceMaps::none(surface.name.clone(), settings, *loss, clock.hz());
+                surfaces.push((surface.index, entity, read));
+                continue;
+            };
+            let size = size.texels();
             let material = material.unwrap_or(&default);
             let now = Now::new(clock.tick(), clock.hz(), &drying, &geometry.0, exposure, material);
-            let wetness = (0..maps.texels().pow(2)).map(|texel| wetness_of(water, &now, texel)).collect();
+            let wetness = (0..size.pow(2)).map(|texel| wetness_of(water, &now, texel)).collect();
             let mut read = SurfaceMaps {
                 name: surface.name.clone(),
-                size: maps.texels(),
+                size,
                 diffuse: vec![],
                 specular: vec![],
                 normal: vec![],
@@ -85,16 +115,21 @@ impl Run<'_> {
                 water: water.clone(),
                 stock: water.stock(&now),
                 matter: matter.clone(),
+                loss: *loss,
                 hz: clock.hz(),
             };
             if let Some(cpu) = cpu {
                 read.diffuse = cpu.diffuse.as_flattened().to_vec();
                 read.specular = cpu.specular.as_flattened().to_vec();
                 read.normal = cpu.normal.as_flattened().to_vec();
-            } else if let Some(gpu) = gpu {
+            } else if let Some(gpu) = gpu.filter(|gpu| gpu.has_colors) {
                 requests.push((entity, 0, Readback::texture(gpu.diffuse.clone())));
                 requests.push((entity, 1, Readback::texture(gpu.specular.clone())));
                 requests.push((entity, 2, Readback::texture(gpu.normal.clone())));
+            } else {
+                // Nothing has been painted.
+                let empty = vec![0; size.pow(2) as usize * 4];
+                (read.diffuse, read.specular, read.normal) = (empty.clone(), empty.clone(), empty);
             }
             surfaces.push((surface.index, entity, read));
         }
@@ -164,7 +199,7 @@ impl Run<'_> {
 }
 
 /// Rows of RGBA texels without what aligns them to 256 bytes on the way.
-fn without_padding(bytes: &[u8], size: u32) -> Vec<u8> {
+pub fn without_padding(bytes: &[u8], size: u32) -> Vec<u8> {
     let row = size as usize * 4;
     let padded = bytes.len() / size as usize;
     bytes.chunks(padded.max(row)).flat_map(|padded| &padded[..row]).copied().collect()
@@ -174,11 +209,11 @@ fn without_padding(bytes: &[u8], size: u32) -> Vec<u8> {
 pub(super) const MAP_NAMES: [&str; 7] =
     ["diffuse", "specular", "normal", "film", "absorbed", "wetness", "since"];
 
-/// Writes `<surface>_<map>.png` for each map: `diffuse`, `specular`, `normal` as they are; `film` and `absorbed` as 16-bit
-/// micrometres of water, `wetness` as 16-bit parts of full, `since` as 16-bit hundredths of a second of the reference
-/// time (0 is never). Values too large stop at 65,535.
+/// Writes `<surface>_<map>.png` for each map of the surfaces that have any: `diffuse`, `specular`, `normal` as they are;
+/// `film` and `absorbed` as 16-bit micrometres of water, `wetness` as 16-bit parts of full, `since` as 16-bit hundredths of
+/// a second of the reference time (0 is never). Values too large stop at 65,535.
 pub(super) fn write_maps(folder: &Path, surfaces: &[SurfaceMaps]) -> Result<(), ReplayError> {
-    for surface in surfaces {
+    for surface in surfaces.iter().filter(|surface| surface.size > 0) {
         let path = |map| folder.join(format!("{}_{map}.png", surface.name));
         let [diffuse, specular, normal, film, absorbed, wetness, since] = MAP_NAMES.map(path);
         for (path, texels) in

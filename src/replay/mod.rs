@@ -5,12 +5,28 @@
 //! the CPU by the same integer arithmetic, and the digest over impacts and amounts comes out the same.
 //!
 //! Nothing is written before the scene is loaded; each file is written under a temporary name and then renamed.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `frame_00000.png`, ... | pictures |
+//! | `maps/` | all maps of all surfaces at the end |
+//! | `series.csv`, `timings.csv` | a row every so often: amounts and particles; how long ticks took |
+//! | `plots/*.svg` | these rows as lines |
+//! | `video.mp4` or `video.apng`, `sheet.png` | the pictures, if asked for |
+//! | `report.json` | the numbers at the end; written last |
 
 mod app;
 mod capture;
 mod files;
 mod maps;
+mod plot;
+mod plots;
 mod report;
+mod series;
+mod sheet;
+mod stages;
+mod table;
+mod video;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -27,16 +43,17 @@ use crate::schedule::TickHold;
 
 pub use app::{require_adapter, task_pools};
 pub use capture::write_png;
-pub use files::write_atomic;
-pub use maps::SurfaceMaps;
+pub use files::{DONE_FILE, write_atomic};
+pub use maps::{SurfaceMaps, without_padding};
 pub use report::{ParticleReport, Report, SurfaceReport, Timing, WaterReport, WorkReport};
+use series::SeriesTables;
 
 /// What to run and what to write.
 #[derive(Debug, Clone)]
 pub struct ReplayOptions {
     /// The scenario.
     pub scenario: LoadedScenario,
-    /// Folder for `frame_*.png`, `capture_*.png`, `maps/` and `report.json`; made if missing. `None` writes nothing.
+    /// Folder for all that is written; made if missing. `None` writes nothing.
     pub out: Option<PathBuf>,
     /// Pictures per second of weather time; at least 1. Without a renderer there are none.
     pub fps: u32,
@@ -58,11 +75,20 @@ pub struct ReplayOptions {
     /// What a frame may paint. Where it is not enough for the ticks of a frame, there are more frames: pictures and maps show
     /// all, whatever it is.
     pub splats: SplatBudget,
+    /// Seconds of weather time between two rows of the series, at least a tick; without, one, or more if a run is so long
+    /// that the rows would be too many.
+    pub every: Option<f32>,
+    /// Make a video of the pictures: with ffmpeg, or else an animated PNG. Needs `out` and `render`.
+    pub video: bool,
+    /// Make a contact sheet of so many pictures, up to [`Self::MAX_SHEET`]. Needs `out` and `render`.
+    pub sheet: Option<u32>,
 }
 
 impl ReplayOptions {
     /// The widest and highest picture.
     pub const MAX_SIZE: u32 = 8192;
+    /// The most pictures on a contact sheet.
+    pub const MAX_SHEET: u32 = 400;
 
     /// A run of `scenario` that draws small pictures at 24 a second.
     pub fn new(scenario: LoadedScenario) -> Self {
@@ -78,6 +104,9 @@ impl ReplayOptions {
             resume: None,
             save: None,
             splats: SplatBudget::LARGEST,
+            every: None,
+            video: false,
+            sheet: None,
         }
     }
 }
@@ -150,7 +179,7 @@ const PATIENCE_SECONDS: u64 = 300;
 /// [`ReplayError`]; then nothing half-written is left, though pictures that were finished before stay.
 pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Result<Report, ReplayError> {
     let begun = Instant::now();
-    options.check()?;
+    let every = options.check()?;
     let saved = options.resume.as_deref().map(SavedScene::read).transpose()?;
     let mut run = Run::load(options)?;
     if let (Some(saved), Some(folder)) = (&saved, &options.resume) {
@@ -175,10 +204,14 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
     if let Some(folder) = &options.save {
         SavedScene::check_folder(folder)?;
     }
+    let mut earlier = None;
     if let Some(out) = &options.out {
         files::require_writable(out)?;
+        earlier = options.resume.is_some().then(|| SeriesTables::read(out));
+        files::remove_earlier_outputs(out)?;
         let taken: Vec<_> = taken.iter().map(|(_, name)| files::capture_file(name)).collect();
         files::remove_earlier_run(out, frames.start, &taken)?;
+        run.begin_series(every);
     }
     let loaded = begun.elapsed();
 
@@ -203,6 +236,10 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
         progress(Progress { tick, ticks });
     }
     run.finish_captures()?;
+    let mut series = run.end_series();
+    if let (Some(series), Some(earlier)) = (&mut series, &earlier) {
+        series.put_before(earlier);
+    }
     let simulated = begun.elapsed() - loaded;
 
     let maps = run.read_maps()?;
@@ -217,6 +254,11 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
     let report = report::report(run.app.world_mut(), options, &maps, timing);
     if let Some(out) = &options.out {
         maps::write_maps(&out.join("maps"), &maps)?;
+        if let Some(series) = &series {
+            series.write(out)?;
+            plots::write_plots(out, &report.scenario, series)?;
+        }
+        options.write_pictures(out)?;
         write_atomic(&out.join("report.json"), &serde_json::to_vec_pretty(&report)?)?;
     }
     if let Some(folder) = &options.save {
@@ -231,7 +273,27 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
 }
 
 impl ReplayOptions {
-    fn check(&self) -> Result<(), ReplayError> {
+    /// What is made of the pictures in the folder.
+    fn write_pictures(&self, out: &Path) -> Result<(), ReplayError> {
+        if !self.video && self.sheet.is_none() {
+            return Ok(());
+        }
+        let frames = files::frames(out);
+        if let Some(count) = self.sheet {
+            let seconds = |number: u32| f64::from(number) / f64::from(self.fps);
+            let pictures: Vec<_> =
+                frames.iter().map(|(number, path)| (seconds(*number), path.clone())).collect();
+            sheet::write_sheet(out, &pictures, count)?;
+        }
+        if self.video {
+            let files: Vec<_> = frames.into_iter().map(|(_, path)| path).collect();
+            video::write_video(out, &files, self.fps)?;
+        }
+        Ok(())
+    }
+
+    /// Checks all options, and tells how many ticks apart the rows of the series are.
+    fn check(&self) -> Result<u32, ReplayError> {
         let wrong =
             |option, value: String, expected: String| Err(ReplayError::Option { option, value, expected });
         if self.fps == 0 || self.fps > WeatheringClock::MAX_HZ {
@@ -264,7 +326,17 @@ impl ReplayOptions {
             let value = save.display().to_string();
             return wrong("save", value, "a folder of its own, beside those of `out` or in them".into());
         }
-        Ok(())
+        if let Some(count) = self.sheet
+            && !(1..=Self::MAX_SHEET).contains(&count)
+        {
+            return wrong("sheet", count.to_string(), format!("1 to {}", Self::MAX_SHEET));
+        }
+        for (option, is_set) in [("video", self.video), ("sheet", self.sheet.is_some())] {
+            if is_set && (self.out.is_none() || !self.render) {
+                return wrong(option, "set".into(), "used with `out` and with `render`".into());
+            }
+        }
+        self.series_ticks()
     }
 }
 

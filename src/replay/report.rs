@@ -8,10 +8,11 @@ use crate::clock::WeatheringClock;
 use crate::collision::ColliderReport;
 use crate::effect::EffectTable;
 use crate::emitter::{EmissionSeed, EmitterState, NewParticles};
-use crate::overlay::SurfaceTotals;
+use crate::matter::SurfaceMatter;
+use crate::overlay::{MapLoss, MapPool, SurfaceTotals};
 use crate::particle::{Particle, ParticleCounts, Particles, WaterCounts};
 use crate::scenario::{Digest, ExpectationOutcome, Expectations, ScenarioSurface, amounts_digest};
-use crate::wetting::{DripEffect, WettingStats};
+use crate::wetting::{DripEffect, Stock, SurfaceWater, WettingStats};
 
 /// `report.json`.
 #[derive(Serialize, Debug, Clone)]
@@ -32,6 +33,8 @@ pub struct Report {
     pub water: WaterReport,
     /// What moving it took; of a run that was resumed, from there on.
     pub work: WorkReport,
+    /// The maps of all surfaces.
+    pub maps: MapPool,
     /// In the order of the scenario.
     pub surfaces: Vec<SurfaceReport>,
     /// What was expected, and what came of it; in order of time.
@@ -66,6 +69,8 @@ pub struct SurfaceReport {
     pub name: String,
     /// Triangles of its mesh.
     pub triangles: u32,
+    /// Texels along each side of its maps; 0 if it has none, for want of room.
+    pub map_size: u32,
     /// Particles that hit it.
     pub impacts: u64,
     /// Water that the particles carried, mm³.
@@ -82,6 +87,8 @@ pub struct SurfaceReport {
     pub painted_mm3: f64,
     /// Water that brushes took, mm³.
     pub wiped_mm3: f64,
+    /// Lost with maps that were taken away or for want of maps, mm³.
+    pub evicted_mm3: f64,
     /// Part of its area that looks wet, 0..=1.
     pub wet_fraction: f64,
     /// Loose grains on it, mm³.
@@ -98,10 +105,12 @@ pub struct SurfaceReport {
     pub wiped_soil_mm3: f64,
     /// Snow that brushes took, mm³ of water.
     pub wiped_snow_mm3: f64,
+    /// Dust, mud and snow lost with maps, mm³.
+    pub evicted_matter_mm3: f64,
 }
 
-/// Where all the water is, mm³: `emitted + melted + painted = on_surfaces + evaporated + run_off + wiped + missed + in_flight`,
-/// in whole nanolitres.
+/// Where all the water is, mm³, in whole nanolitres:
+/// `emitted + melted + painted = on_surfaces + evaporated + run_off + wiped + missed + in_flight + evicted`.
 #[derive(Serialize, Debug, Clone, Copy, PartialEq)]
 pub struct WaterReport {
     /// Sent out by emitters.
@@ -124,6 +133,8 @@ pub struct WaterReport {
     pub in_flight_mm3: f64,
     /// Not sent out yet, since a limit left no particle to take it along; no part of the sum.
     pub held_mm3: f64,
+    /// Lost with maps that were taken away or for want of maps.
+    pub evicted_mm3: f64,
     /// What the sum differs by, in parts of what came.
     pub imbalance: f64,
 }
@@ -176,31 +187,36 @@ pub(super) fn report(
         .filter_map(|(surface, totals, collider)| {
             let maps = maps.get(surface.index as usize)?;
             let mm3 = |units| maps.water.units().mm3(units);
+            let (loss, lost) = (&maps.loss, MapLoss::mm3);
             let row = SurfaceReport {
                 name: surface.name.clone(),
                 triangles: collider.0.total,
+                map_size: maps.size,
                 impacts: totals.impacts,
                 received_mm3: totals.water_nl as f64 / 1000.0,
                 film_mm3: mm3(maps.stock.film),
                 absorbed_mm3: mm3(maps.stock.pores),
-                evaporated_mm3: mm3(maps.stock.evaporated),
-                dripped_mm3: mm3(maps.water.ledger().dripped),
-                painted_mm3: mm3(maps.water.ledger().painted),
-                wiped_mm3: mm3(maps.water.ledger().wiped),
+                evaporated_mm3: mm3(maps.stock.evaporated) + lost(loss.evaporated),
+                dripped_mm3: mm3(maps.water.ledger().dripped) + lost(loss.dripped),
+                painted_mm3: mm3(maps.water.ledger().painted) + lost(loss.painted),
+                wiped_mm3: mm3(maps.water.ledger().wiped) + lost(loss.wiped),
+                evicted_mm3: lost(loss.water),
                 wet_fraction: maps.wet_fraction,
                 dust_mm3: mm3(maps.matter.stock().dust),
                 mud_mm3: mm3(maps.matter.stock().mud),
                 snow_mm3: mm3(maps.matter.stock().snow),
-                washed_off_mm3: mm3(maps.matter.ledger().washed_off),
-                slid_off_mm3: mm3(maps.matter.ledger().slid_off),
-                wiped_soil_mm3: mm3(maps.matter.ledger().wiped),
-                wiped_snow_mm3: mm3(maps.matter.ledger().wiped_snow),
+                washed_off_mm3: mm3(maps.matter.ledger().washed_off) + lost(loss.washed_off),
+                slid_off_mm3: mm3(maps.matter.ledger().slid_off) + lost(loss.slid_off),
+                wiped_soil_mm3: mm3(maps.matter.ledger().wiped) + lost(loss.wiped_soil),
+                wiped_snow_mm3: mm3(maps.matter.ledger().wiped_snow) + lost(loss.wiped_snow),
+                evicted_matter_mm3: lost(loss.soil + loss.snow),
             };
             Some((surface.index, row))
         })
         .collect();
     surfaces.sort_by_key(|(index, _)| *index);
-    let water = water_report(world, maps);
+    let accounts: Vec<_> = maps.iter().map(SurfaceMaps::accounts).collect();
+    let water = water_report(world, &accounts);
 
     let clock = *world.resource::<WeatheringClock>();
     let counts = *world.resource::<ParticleCounts>();
@@ -226,6 +242,7 @@ pub(super) fn report(
             tiles_run: stats.tiles_run(),
             tiles_spread: stats.tiles_spread(),
         },
+        maps: *world.resource::<MapPool>(),
         surfaces: surfaces.into_iter().map(|(_, row)| row).collect(),
         expectations: world.resource::<Expectations>().outcomes().to_vec(),
         digest: amounts_digest(digest, maps.iter().map(|maps| (&maps.water, &maps.matter))),
@@ -233,13 +250,34 @@ pub(super) fn report(
     }
 }
 
+/// The accounts of a surface.
+pub(super) struct SurfaceAccounts<'a> {
+    pub(super) water: &'a SurfaceWater,
+    /// Where that water is now.
+    pub(super) stock: Stock,
+    pub(super) matter: &'a SurfaceMatter,
+    /// What was lost with maps.
+    pub(super) loss: &'a MapLoss,
+}
+
+impl SurfaceMaps {
+    fn accounts(&self) -> SurfaceAccounts<'_> {
+        SurfaceAccounts { water: &self.water, stock: self.stock, matter: &self.matter, loss: &self.loss }
+    }
+}
+
 /// Adds up all water, wherever it is.
-fn water_report(world: &mut World, maps: &[SurfaceMaps]) -> WaterReport {
+pub(super) fn water_report(world: &World, maps: &[SurfaceAccounts]) -> WaterReport {
     let nl = |nl: u64| nl as f64 / 1000.0;
-    let mut emitters = world.query::<&EmitterState>();
-    let held_mm3 = emitters.iter(world).map(EmitterState::held_mm3).sum::<f64>() + 0.0;
-    let sum = |of: &dyn Fn(&SurfaceMaps) -> u64| -> f64 {
+    // There is no such query in a world that has never seen an emitter.
+    let held_mm3 = world
+        .try_query::<&EmitterState>()
+        .map_or(0.0, |mut emitters| emitters.iter(world).map(EmitterState::held_mm3).sum::<f64>() + 0.0);
+    let sum = |of: &dyn Fn(&SurfaceAccounts) -> u64| -> f64 {
         maps.iter().map(|maps| maps.water.units().mm3(of(maps))).sum::<f64>() + 0.0
+    };
+    let lost = |of: &dyn Fn(&MapLoss) -> u64| -> f64 {
+        maps.iter().map(|maps| MapLoss::mm3(of(maps.loss))).sum::<f64>() + 0.0
     };
     let effects = world.resource::<EffectTable>();
     let waiting = world.resource::<NewParticles>().waiting().iter().copied();
@@ -255,15 +293,18 @@ fn water_report(world: &mut World, maps: &[SurfaceMaps]) -> WaterReport {
     };
     let mut report = WaterReport {
         emitted_mm3: nl(counts.emitted_nl),
-        melted_mm3: sum(&|maps| maps.matter.ledger().melted),
-        painted_mm3: sum(&|maps| maps.water.ledger().painted),
+        melted_mm3: sum(&|maps| maps.matter.ledger().melted) + lost(&|loss| loss.melted),
+        painted_mm3: sum(&|maps| maps.water.ledger().painted) + lost(&|loss| loss.painted),
         on_surfaces_mm3: sum(&|maps| maps.stock.film + maps.stock.pores),
-        evaporated_mm3: sum(&|maps| maps.stock.evaporated),
-        run_off_mm3: nl(expired(true)) + sum(&|maps| maps.water.ledger().spilled),
-        wiped_mm3: sum(&|maps| maps.water.ledger().wiped),
+        evaporated_mm3: sum(&|maps| maps.stock.evaporated) + lost(&|loss| loss.evaporated),
+        run_off_mm3: nl(expired(true))
+            + sum(&|maps| maps.water.ledger().spilled)
+            + lost(&|loss| loss.spilled),
+        wiped_mm3: sum(&|maps| maps.water.ledger().wiped) + lost(&|loss| loss.wiped),
         missed_mm3: nl(expired(false)),
         in_flight_mm3: nl(in_flight),
         held_mm3,
+        evicted_mm3: lost(&|loss| loss.water),
         imbalance: 0.0,
     };
     let found = report.on_surfaces_mm3
@@ -271,7 +312,8 @@ fn water_report(world: &mut World, maps: &[SurfaceMaps]) -> WaterReport {
         + report.run_off_mm3
         + report.wiped_mm3
         + report.missed_mm3
-        + report.in_flight_mm3;
+        + report.in_flight_mm3
+        + report.evicted_mm3;
     let came = report.emitted_mm3 + report.melted_mm3 + report.painted_mm3;
     if came > 0.0 {
         report.imbalance = (came - found) / came;

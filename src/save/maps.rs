@@ -128,7 +128,8 @@ pub(super) fn write(scene: &SavedScene, folder: &Path) -> Result<(), SaveError> 
 }
 
 fn write_files(scene: &SavedScene, folder: &Path) -> Result<(), SaveError> {
-    for (state, surface) in scene.state.surfaces.iter().zip(&scene.surfaces) {
+    let surfaces = scene.state.surfaces.iter().zip(&scene.surfaces);
+    for (state, surface) in surfaces.filter(|(state, _)| state.size > 0) {
         let size = state.size;
         let put = |map: &str, bytes: Vec<u8>| {
             let path = file(folder, &state.name, map);
@@ -198,6 +199,14 @@ pub(super) fn read(folder: &Path) -> Result<SavedScene, SaveError> {
         if !plain {
             let field = format!("surfaces[{index}].name");
             return Err(value(&path, &field, &surface.name, "a plain name".into()));
+        }
+        if surface.size == 0 {
+            surfaces.push(SavedSurface {
+                water: SurfaceWater::of_size(TILE_SIZE, [Wrap::Clamp; 2], 1.0),
+                matter: SurfaceMatter::default(),
+                colors: ColorMaps::default(),
+            });
+            continue;
         }
         let whole = Weatherable {
             map_size: surface.size,

@@ -28,7 +28,7 @@ use serde::{Deserialize, Serialize};
 use crate::clock::WeatheringClock;
 use crate::emitter::{EmissionSeed, Emitter, EmitterState, NewParticles};
 use crate::matter::{MatterLedger, SurfaceMatter, bind_dried};
-use crate::overlay::{SurfaceTotals, SurfaceTraces};
+use crate::overlay::{MapLoss, MapSize, SurfaceTotals, SurfaceTraces, TILE_SIZE, Wrap};
 use crate::particle::{ParticleCounts, Particles, SavedParticle, WaterCounts};
 use crate::scenario::{Digest, LoadedScenario, ScenarioSurface};
 use crate::weather::{DryingClock, DryingPoint, Weather};
@@ -79,7 +79,7 @@ pub(super) struct SceneState {
 #[serde(deny_unknown_fields)]
 pub(super) struct SurfaceState {
     pub(super) name: String,
-    /// Texels along each side.
+    /// Texels along each side; 0 for a surface without maps.
     pub(super) size: u32,
     /// Units to a nanolitre, as a power of two.
     pub(super) shift: u32,
@@ -94,6 +94,9 @@ pub(super) struct SurfaceState {
     pub(super) rained_at: u32,
     pub(super) totals: SurfaceTotals,
     pub(super) traces: SurfaceTraces,
+    /// What was lost with maps.
+    #[serde(default)]
+    pub(super) loss: MapLoss,
 }
 
 /// The maps of a surface.
@@ -139,12 +142,13 @@ impl SavedScene {
                 // What the next tick would begin with.
                 bind_dried(water.bypass_change_detection(), matter.bypass_change_detection());
             }
-            let Some(water) = world.get::<SurfaceWater>(entity) else { continue };
+            let water = world.get::<SurfaceWater>(entity).cloned();
+            let water = water.unwrap_or_else(|| SurfaceWater::of_size(TILE_SIZE, [Wrap::Clamp; 2], 1.0));
             let matter = world.get::<SurfaceMatter>(entity).cloned().unwrap_or_default();
             let of = |entity: Entity| world.get::<SurfaceTotals>(entity).copied().unwrap_or_default();
             states.push(SurfaceState {
                 name,
-                size: water.size(),
+                size: world.get::<MapSize>(entity).map_or(0, MapSize::texels),
                 shift: water.units().shift,
                 wet: water.is_wet(),
                 marks: !water.marks().is_empty(),
@@ -154,8 +158,9 @@ impl SavedScene {
                 rained_at: water.rained_at,
                 totals: of(entity),
                 traces: world.get::<SurfaceTraces>(entity).copied().unwrap_or_default(),
+                loss: world.get::<MapLoss>(entity).copied().unwrap_or_default(),
             });
-            surfaces.push(SavedSurface { water: water.clone(), matter, colors });
+            surfaces.push(SavedSurface { water, matter, colors });
         }
         let clock = *world.resource::<WeatheringClock>();
         let new = world.resource::<NewParticles>();

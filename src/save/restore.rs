@@ -4,6 +4,7 @@ use std::path::Path;
 
 use bevy::asset::RenderAssetUsages;
 use bevy::prelude::*;
+use bevy::render::storage::ShaderBuffer;
 
 use super::maps::value;
 use super::{SaveError, SavedScene, emitters_in_order, surfaces_in_order};
@@ -12,7 +13,8 @@ use crate::effect::EffectTable;
 use crate::emitter::{EmissionSeed, EmitterState, NewParticles};
 use crate::matter::SurfaceMatter;
 use crate::overlay::{
-    CpuMaps, Lying, Overlays, SurfaceFrames, SurfaceTotals, SurfaceTraces, Weatherable, mip_chain,
+    CpuMaps, Lying, MapLoss, MapSize, Overlays, SurfaceFrames, SurfaceTotals, SurfaceTraces, Weatherable,
+    mip_chain,
 };
 use crate::particle::Particles;
 use crate::scenario::{Digest, LoadedScenario, check_weather, rewind};
@@ -118,6 +120,9 @@ impl SavedScene {
         if let Some(mut traces) = world.get_mut::<SurfaceTraces>(entity) {
             *traces = state.traces;
         }
+        if let Some(mut loss) = world.get_mut::<MapLoss>(entity) {
+            *loss = state.loss;
+        }
         if let Some(mut water) = world.get_mut::<SurfaceWater>(entity) {
             *water = SurfaceWater { wrap: water.wrap, notes_dried: state.matter, ..saved.water.clone() };
         }
@@ -125,6 +130,15 @@ impl SavedScene {
             *matter = saved.matter.clone();
         }
         if let Some(mut overlays) = world.get::<Overlays>(entity).cloned() {
+            let colors = &saved.colors;
+            let is_empty = |bytes: &[u8]| bytes.iter().all(|&byte| byte == 0);
+            if is_empty(&colors.diffuse) && is_empty(&colors.specular) && is_empty(&colors.normal) {
+                // The first splat will make room.
+                return;
+            }
+            world.resource_scope(|world, mut images: Mut<Assets<Image>>| {
+                overlays.open_colors(&mut images, &mut world.resource_mut::<Assets<ShaderBuffer>>());
+            });
             let lying = world.get::<SurfaceFrames>(entity).map(Lying::new);
             let mut images = world.resource_mut::<Assets<Image>>();
             for (handle, bytes) in [
@@ -140,14 +154,16 @@ impl SavedScene {
                 *handle = images.add(image);
             }
             world.entity_mut(entity).insert(overlays);
-        } else if let Some(surface) = world.get::<Weatherable>(entity) {
+        } else if let (Some(surface), Some(size)) =
+            (world.get::<Weatherable>(entity), world.get::<MapSize>(entity))
+        {
             // Without a renderer there are none before the first tick.
             let texels = |bytes: &[u8]| bytes.as_chunks::<4>().0.to_vec();
             let maps = CpuMaps {
                 diffuse: texels(&saved.colors.diffuse),
                 specular: texels(&saved.colors.specular),
                 normal: texels(&saved.colors.normal),
-                ..CpuMaps::new(surface)
+                ..CpuMaps::of_size(size.texels(), surface.wrap())
             };
             world.entity_mut(entity).insert(maps);
         }

@@ -1,6 +1,6 @@
 //! The files that a glTF names in turn: they must lie inside the tree, too.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -8,8 +8,17 @@ use super::{LoadedScenario, ScenarioError};
 use crate::scenes::gltf_mesh::{data_uri, percent_decoded};
 
 impl LoadedScenario {
-    /// Checks that a glTF and every buffer and image it refers to exist inside the tree.
-    pub(super) fn validate_gltf(&self, field: &str, value: &str) -> Result<(), ScenarioError> {
+    /// Checks that a glTF and every buffer and image it refers to exist inside the tree. `value` is its path there, `field`
+    /// what messages call it.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] for what is missing, outside the tree, or no glTF.
+    pub fn validate_gltf(&self, field: &str, value: &str) -> Result<(), ScenarioError> {
+        self.gltf_files(field, value).map(drop)
+    }
+
+    /// A glTF and every buffer and image it refers to; all of them exist inside the tree.
+    pub(super) fn gltf_files(&self, field: &str, value: &str) -> Result<Vec<PathBuf>, ScenarioError> {
         let file = self.resolve(field, value)?;
         let bytes = std::fs::read(&file).map_err(|error| self.content_error(field, value, error))?;
         let json = match json_chunk(&bytes) {
@@ -18,17 +27,18 @@ impl LoadedScenario {
         };
         let json = json.map_err(|error| self.content_error(field, value, format!("not a glTF: {error}")))?;
         let folder = Path::new(value).parent().unwrap_or(Path::new(""));
+        let mut files = vec![file];
         for list in ["buffers", "images"] {
             for uri in json[list].as_array().into_iter().flatten().filter_map(|entry| entry["uri"].as_str()) {
                 let field = format!("{field} -> {list}");
                 let no_text = || self.content_error(&field, uri, "its escapes stand for no text");
                 let decoded = percent_decoded(uri).ok_or_else(no_text)?;
                 if data_uri(&decoded).is_none() {
-                    self.resolve(&field, &folder.join(&*decoded).to_string_lossy())?;
+                    files.push(self.resolve(&field, &folder.join(&*decoded).to_string_lossy())?);
                 }
             }
         }
-        Ok(())
+        Ok(files)
     }
 }
 

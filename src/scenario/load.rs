@@ -215,6 +215,20 @@ fn resolve(tree: &Path, file: &Path, field: &str, value: &str) -> Result<PathBuf
 }
 
 impl LoadedScenario {
+    /// A scenario that was made in code, by the name of a file in its tree. It is taken as it is: nothing is checked.
+    pub fn made(scenario: Scenario, file: PathBuf, tree: PathBuf) -> Self {
+        Self {
+            scenario,
+            file,
+            tree,
+            hash: String::new(),
+            variant: None,
+            variants: Vec::new(),
+            included: Vec::new(),
+            origins: Origins::default(),
+        }
+    }
+
     /// The file a path in the scenario means.
     ///
     /// # Errors

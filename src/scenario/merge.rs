@@ -90,6 +90,7 @@ impl Merged {
         replace(&mut part.camera, over.camera);
         replace(&mut part.sun, over.sun);
         replace(&mut part.environment, over.environment);
+        replace(&mut part.map_budget, over.map_budget);
         part.variants.extend(over.variants);
         for (name, material) in over.materials {
             origins.materials.insert(name.clone(), origin(format!("materials.{name}")));

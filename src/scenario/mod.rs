@@ -15,6 +15,7 @@
 mod content;
 mod digest;
 mod error;
+mod files;
 mod gltf_uris;
 mod load;
 mod merge;
@@ -22,6 +23,7 @@ mod motion;
 mod reset;
 mod schema;
 mod spawn;
+mod switch;
 mod timeline;
 mod validate;
 
@@ -29,15 +31,16 @@ pub use content::SurfaceMesh;
 pub use digest::{Digest, amounts_digest};
 pub use error::ScenarioError;
 pub use load::LoadedScenario;
-pub use motion::ScenarioCamera;
+pub use motion::{ByHand, ScenarioCamera};
 pub use reset::reset_scenario;
 pub use schema::schema_json;
 pub use schema::{
-    CameraKey, CameraSpec, EmitterChange, EmitterKey, EmitterSpec, EnvironmentSpec, MaterialSpec, MeshSpec,
-    Scenario, ScenarioPart, SunSpec, SurfaceSpec, SurfaceTextureSpec, TextureSpec, WeatherPart, WeatherSpec,
-    WetMapSpec,
+    CameraKey, CameraSpec, EmitterChange, EmitterKey, EmitterSpec, EnvironmentSpec, MapBudgetSpec,
+    MaterialSpec, MeshSpec, Scenario, ScenarioPart, SunSpec, SurfaceSpec, SurfaceTextureSpec, TextureSpec,
+    WeatherPart, WeatherSpec, WetMapSpec,
 };
-pub use spawn::{ScenarioPlugin, ScenarioStatus, ScenarioSurface};
+pub use spawn::{AssetTree, ScenarioPlugin, ScenarioStatus, ScenarioSurface, SceneEntity};
+pub use switch::{PreparedScenario, switch_scenario};
 pub use timeline::{
     Action, BrushEvent, CameraMove, EmitterMove, EventSpec, Expectation, ExpectationOutcome, Expectations,
     MaterialChange, Quantity, WeatherChange,

@@ -33,6 +33,10 @@ impl EmitterMotion {
     }
 }
 
+/// An emitter of the scenario that somebody has taken in hand: neither its keys nor its working hours apply any more.
+#[derive(Component, Debug, Default, Clone, Copy)]
+pub struct ByHand;
+
 /// The scenario's camera. Follows its keys unless the component is removed.
 #[derive(Component, Debug)]
 pub struct ScenarioCamera {
@@ -60,7 +64,10 @@ pub(super) fn between<K: Copy>(keys: &[K], time: impl Fn(&K) -> f32, t: f32) -> 
 /// Moves and switches emitters at the start of a tick; writes their global transform, since the tick needs it now.
 pub(super) fn move_emitters(
     clock: Res<WeatheringClock>,
-    mut emitters: Query<(&EmitterMotion, &mut Emitter, &mut Transform, &mut GlobalTransform)>,
+    mut emitters: Query<
+        (&EmitterMotion, &mut Emitter, &mut Transform, &mut GlobalTransform),
+        Without<ByHand>,
+    >,
 ) {
     let t = clock.seconds() as f32;
     for (motion, mut emitter, mut transform, mut global) in &mut emitters {

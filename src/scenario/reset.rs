@@ -7,7 +7,7 @@ use super::timeline::rewind;
 use crate::clock::WeatheringClock;
 use crate::emitter::{Emitter, EmitterState, NewParticles};
 use crate::matter::{FallingSnow, MatterQueue, SurfaceMatter};
-use crate::overlay::{CpuMaps, SplatQueue, SurfaceTotals, SurfaceTraces, Weatherable};
+use crate::overlay::{CpuMaps, MapLoss, SplatQueue, SurfaceTotals, SurfaceTraces, Weatherable};
 use crate::particle::{ParticleCounts, Particles, Splashes, WaterCounts};
 use crate::weather::DryingClock;
 use crate::wetting::{DropQueue, SurfaceWater};
@@ -25,12 +25,12 @@ pub fn reset_scenario(world: &mut World) {
         &mut SplatQueue,
         &mut SurfaceTotals,
         &mut SurfaceTraces,
-        Option<&mut CpuMaps>,
+        (Option<&mut CpuMaps>, &mut MapLoss),
         Option<&mut SurfaceWater>,
         Option<&mut DropQueue>,
         Option<(&mut SurfaceMatter, &mut MatterQueue, &mut FallingSnow)>,
     )>();
-    for (mut surface, mut queue, mut totals, mut traces, maps, water, drops, matter) in
+    for (mut surface, mut queue, mut totals, mut traces, (maps, mut loss), water, drops, matter) in
         surfaces.iter_mut(world)
     {
         if let Some((mut matter, mut deposits, mut falling)) = matter {
@@ -50,8 +50,9 @@ pub fn reset_scenario(world: &mut World) {
         queue.restore_traces(SurfaceTraces::default());
         *traces = SurfaceTraces::default();
         *totals = SurfaceTotals::default();
+        *loss = MapLoss::default();
         if let Some(mut maps) = maps {
-            *maps = CpuMaps::new(&surface);
+            *maps = CpuMaps::of_size(maps.size, maps.wrap);
         }
     }
     world.resource_mut::<NewParticles>().restart();

@@ -1,5 +1,7 @@
 //! Building the scene, and waiting until all of it is there.
 
+use std::path::PathBuf;
+
 use bevy::asset::LoadState;
 use bevy::camera::Exposure;
 use bevy::gltf::GltfAssetLabel;
@@ -9,14 +11,14 @@ use bevy::render::RenderApp;
 
 use super::content::Content;
 use super::motion::{ScenarioCamera, move_camera};
-use super::timeline::{MaterialHandles, apply_events_plugin, camera_keys, emitter_motion};
+use super::timeline::{MaterialHandles, apply_events_plugin, camera_keys, emitter_motion, insert_events};
 use super::{Digest, LoadedScenario, MeshSpec, ScenarioError};
 use crate::clock::ClockPlugin;
 use crate::collision::{BuildColliders, MeshColliders, NotWeatherable, SurfaceCollider};
 use crate::effect::{EffectTable, WeatherEffect};
 use crate::emitter::{EmissionSeed, Emitter};
 use crate::material::{PlayedWetMap, Playing};
-use crate::overlay::{FramesWork, OverlayUv, PrepareStamps, TexelArea, Weatherable};
+use crate::overlay::{FramesWork, OverlayUv, PrepareStamps, TexelArea, Unmapped, Weatherable};
 use crate::particle::{Forces, ParticleConfig};
 use crate::unwrap::NotUnwrapped;
 use crate::wetting::{self, ExposureProgress, MeasureSurfaces};
@@ -46,6 +48,15 @@ impl ScenarioPlugin {
 #[derive(Resource, Debug, Clone)]
 struct CurrentScenario(LoadedScenario);
 
+/// What a scenario has spawned: it goes when another takes its place.
+#[derive(Component, Debug, Default, Clone, Copy)]
+pub struct SceneEntity;
+
+/// The folder that the app's asset server reads from, where it may be another than the scenario's tree: then files of the
+/// scenario are loaded by absolute paths, which the asset server must allow.
+#[derive(Resource, Debug, Clone)]
+pub struct AssetTree(pub PathBuf);
+
 /// How far the scenario is.
 #[derive(Resource, Debug, Default)]
 pub enum ScenarioStatus {
@@ -69,15 +80,8 @@ pub struct ScenarioSurface {
 
 impl Plugin for ScenarioPlugin {
     fn build(&self, app: &mut App) {
-        let scenario = &self.scenario.scenario;
-        ClockPlugin { hz: scenario.tick_hz }.insert_clock(app);
-        app.insert_resource(EmissionSeed(self.seed.unwrap_or(scenario.seed)))
-            .insert_resource(Forces { gravity: scenario.gravity })
-            .insert_resource(scenario.weather())
-            .insert_resource(ParticleConfig { max_alive: scenario.max_particles })
-            .insert_resource(CurrentScenario(self.scenario.clone()))
-            .init_resource::<ScenarioStatus>()
-            .init_resource::<Digest>()
+        set_up(app.world_mut(), &self.scenario, self.seed);
+        app.init_resource::<Digest>()
             .add_systems(
                 PreUpdate,
                 watch_loading
@@ -87,8 +91,7 @@ impl Plugin for ScenarioPlugin {
                     .after(PrepareStamps),
             )
             .add_systems(Update, move_camera);
-        apply_events_plugin(app, scenario);
-        app.world_mut().resource_mut::<Time<Virtual>>().pause();
+        apply_events_plugin(app);
 
         let content = self.content.lock().ok().and_then(|mut content| content.take());
         let Some(content) = content else { return };
@@ -97,12 +100,38 @@ impl Plugin for ScenarioPlugin {
     }
 }
 
-fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, looks: bool) {
+/// Clock, weather and limits of a scenario that begins. Virtual time stands still until all of it is there.
+pub(super) fn set_up(world: &mut World, loaded: &LoadedScenario, seed: Option<u64>) {
+    let scenario = &loaded.scenario;
+    ClockPlugin { hz: scenario.tick_hz }.insert_clock(world);
+    world.insert_resource(EmissionSeed(seed.unwrap_or(scenario.seed)));
+    world.insert_resource(Forces { gravity: scenario.gravity });
+    world.insert_resource(scenario.weather());
+    world.insert_resource(ParticleConfig { max_alive: scenario.max_particles });
+    world.insert_resource(CurrentScenario(loaded.clone()));
+    world.insert_resource(scenario.map_budget().unwrap_or_default());
+    insert_events(world, scenario);
+    world.insert_resource(ScenarioStatus::Loading);
+    world.resource_mut::<Time<Virtual>>().pause();
+}
+
+/// What the asset server calls a file of the scenario.
+fn asset_path(world: &World, loaded: &LoadedScenario, path: &str) -> String {
+    match world.get_resource::<AssetTree>() {
+        Some(AssetTree(tree)) if *tree != loaded.tree => {
+            loaded.tree.join(path).to_string_lossy().into_owned()
+        }
+        _ => path.to_owned(),
+    }
+}
+
+pub(super) fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, looks: bool) {
     let scenario = &loaded.scenario;
     for (index, (spec, effect)) in scenario.emitters.iter().zip(content.effects).enumerate() {
         let handle = world.resource_mut::<Assets<WeatherEffect>>().add(effect.clone());
         world.resource_mut::<EffectTable>().insert(handle.clone(), effect);
         world.spawn((
+            SceneEntity,
             Name::new(spec.name.clone()),
             Emitter {
                 effect: handle,
@@ -132,7 +161,8 @@ fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, loo
         let mesh = match (&spec.mesh, mesh) {
             (MeshSpec::File(path), _) => {
                 let label = GltfAssetLabel::Primitive { mesh: 0, primitive: 0 };
-                world.resource::<AssetServer>().load(label.from_asset(path.clone()))
+                let path = asset_path(world, loaded, path);
+                world.resource::<AssetServer>().load(label.from_asset(path))
             }
             (_, Some(mesh)) => world.resource_mut::<Assets<Mesh>>().add(mesh),
             (_, None) => continue,
@@ -140,6 +170,7 @@ fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, loo
         let transform = spec.transform();
         let surface = ScenarioSurface { index: index as u32, name: spec.name.clone() };
         let mut entity = world.spawn((
+            SceneEntity,
             Name::new(spec.name.clone()),
             surface,
             spec.maps,
@@ -178,6 +209,7 @@ fn spawn_view(
     let scenario = &loaded.scenario;
     let [red, green, blue] = scenario.sun.color;
     world.spawn((
+        SceneEntity,
         Name::new("sun"),
         DirectionalLight {
             illuminance: scenario.sun.illuminance,
@@ -190,6 +222,7 @@ fn spawn_view(
         Transform::default().looking_to(scenario.sun.direction, Vec3::Y),
     ));
     let mut camera = world.spawn((
+        SceneEntity,
         Name::new("camera"),
         Camera3d::default(),
         Msaa::Sample4,
@@ -237,6 +270,8 @@ fn watch_loading(
         (),
         (
             With<ScenarioSurface>,
+            // Refused for want of room, which the log tells.
+            Without<Unmapped>,
             Or<(Without<SurfaceCollider>, Without<TexelArea>, Without<wetting::Exposure>)>,
         ),
     >,

@@ -6,7 +6,7 @@ use std::fmt::Display;
 use bevy::math::{Vec2, Vec3};
 
 use super::{
-    EmitterSpec, LoadedScenario, MaterialSpec, MeshSpec, Scenario, ScenarioError, SurfaceSpec,
+    EmitterSpec, LoadedScenario, MapBudgetSpec, MaterialSpec, MeshSpec, Scenario, ScenarioError, SurfaceSpec,
     SurfaceTextureSpec, TextureSpec,
 };
 use crate::clock::WeatheringClock;
@@ -63,6 +63,12 @@ impl LoadedScenario {
         self.vector("wind", scenario.wind, FASTEST)?;
         let most = f64::from(Scenario::MAX_PARTICLES);
         self.range("max_particles", f64::from(scenario.max_particles), 1.0, most)?;
+        if let Some(MapBudgetSpec { mib, texel_mm }) = scenario.map_budget {
+            self.positive("map_budget.mib", mib, MapBudgetSpec::MAX_MIB)?;
+            if let Some(texel_mm) = texel_mm {
+                self.positive("map_budget.texel_mm", texel_mm, MapBudgetSpec::MAX_TEXEL_MM)?;
+            }
+        }
         self.validate_view()?;
         // Wind and direction of the sun have been checked by their own names.
         check_weather(&scenario.weather()).map_err(|wrong| self.out_of_range("weather", wrong))?;

@@ -20,7 +20,7 @@ use super::{Now, SurfaceWater, TexelLayout, WetGeometry};
 use crate::clock::WeatheringClock;
 use crate::collision::{CollisionScene, MeshBvh, MeshColliders, NotWeatherable, SurfaceCollider};
 use crate::material::PorousMaterial;
-use crate::overlay::{Weatherable, Wrap};
+use crate::overlay::{Unmapped, Weatherable, Wrap};
 use crate::weather::{DryingClock, Weather};
 use crate::wetmap::{accessibility, sun_visibility};
 
@@ -182,6 +182,16 @@ type Exposed = (
     Option<&'static mut Exposure>,
 );
 
+/// Surfaces whose shape is still to come.
+type Unmeasured = (
+    With<Weatherable>,
+    With<Mesh3d>,
+    Without<WetGeometry>,
+    Without<NotWeatherable>,
+    // Without texels there is nothing to come.
+    Without<Unmapped>,
+);
+
 /// Casts rays for all surfaces when one is new or gone, or the sun has moved.
 pub(super) fn bake_exposure(
     mut commands: Commands,
@@ -190,7 +200,7 @@ pub(super) fn bake_exposure(
     weather: Res<Weather>,
     colliders: Res<MeshColliders>,
     mut progress: ResMut<ExposureProgress>,
-    unmeasured: Query<(), (With<Weatherable>, With<Mesh3d>, Without<WetGeometry>, Without<NotWeatherable>)>,
+    unmeasured: Query<(), Unmeasured>,
     mut surfaces: Query<Exposed>,
 ) {
     if let Some(task) = &mut progress.task {

@@ -21,7 +21,7 @@ use half::f16;
 use super::surface::{Tiles, texel_in};
 use super::{Exposure, Marks, SurfaceWater, WetGeometry};
 use crate::matter::{GpuTexelMatter, SurfaceMatter, pack_matter};
-use crate::overlay::{Overlays, TILE_SIZE};
+use crate::overlay::{MapSize, Overlays, TILE_SIZE};
 
 /// A texel as the shader reads it: `TexelWater` in `shaders/common/wet_map.wgsl` has the same fields.
 #[repr(C)]
@@ -49,7 +49,7 @@ impl Plugin for WaterUploadPlugin {
             return;
         }
         let stats = UploadStats::default();
-        app.insert_resource(stats.clone()).add_systems(
+        app.insert_resource(stats.clone()).add_observer(release_tiles).add_systems(
             PostUpdate,
             pack_tiles.in_set(PackWater).after(crate::overlay::deposit::note_traces),
         );
@@ -89,6 +89,11 @@ pub(super) struct PackedTiles {
     texels: Vec<GpuTexelWater>,
     /// Of the same texels; none while no matter has come.
     matter: Vec<GpuTexelMatter>,
+}
+
+/// Nothing is sent for maps that are gone.
+fn release_tiles(removed: On<Remove, MapSize>, mut commands: Commands) {
+    commands.entity(removed.entity).try_remove::<PackedTiles>();
 }
 
 /// Packs what changed, and makes room on the GPU for a surface's first water.
@@ -222,7 +227,8 @@ fn extract_tiles(
         waiting.packed.texels.append(&mut packed.texels);
         waiting.packed.matter.append(&mut packed.matter);
     }
-    pending.surfaces.retain(|entity, _| main_world.get_entity(*entity).is_ok());
+    // Gone, or without maps.
+    pending.surfaces.retain(|entity, _| main_world.get::<Overlays>(*entity).is_some());
 }
 
 /// Writes tiles into their buffers; neighbours in one go. The order of surfaces does not matter: each has its own.

@@ -36,6 +36,7 @@ mod ownership;
 mod points;
 mod posed;
 mod prepare;
+mod put_back;
 pub(crate) mod query;
 mod rim;
 mod run_off;
@@ -102,6 +103,7 @@ impl Plugin for WettingPlugin {
             .add_message::<BecameWet>()
             .add_message::<Dried>()
             .add_observer(prepare::release_surface)
+            .add_observer(prepare::release_maps)
             .add_systems(
                 PreUpdate,
                 (

@@ -13,7 +13,7 @@ use crate::clock::WeatheringClock;
 use crate::collision::{DeformingCollider, MeshBvh, SurfaceCollider};
 use crate::material::PorousMaterial;
 use crate::matter::{FallingSnow, MatterQueue, SurfaceMatter};
-use crate::overlay::{TexelArea, Weatherable, Wrap};
+use crate::overlay::{MapSize, TexelArea, Weatherable, Wrap};
 use crate::weather::DryingClock;
 
 /// The shape of a surface's texels, and which lie beside each other. Comes some frames after its collider.
@@ -45,7 +45,7 @@ impl Measured {
 
     fn is_of(
         &self,
-        surface: &Weatherable,
+        map: (u32, [Wrap; 2]),
         collider: &SurfaceCollider,
         transform: &GlobalTransform,
         is_posed: bool,
@@ -59,15 +59,13 @@ impl Measured {
         };
         // A degree or two of turning changes nothing worth measuring again.
         let turned = (0..3).any(|axis| change(axis) > 0.03 * scale);
-        !turned
-            && (self.size, self.wrap) == (surface.texels(), surface.wrap())
-            && Arc::ptr_eq(&self.bvh, &collider.0)
+        !turned && (self.size, self.wrap) == map && Arc::ptr_eq(&self.bvh, &collider.0)
     }
 }
 
 type Measurable = (
     Entity,
-    Ref<'static, Weatherable>,
+    (Ref<'static, Weatherable>, Ref<'static, MapSize>),
     Ref<'static, SurfaceCollider>,
     &'static TexelArea,
     Ref<'static, GlobalTransform>,
@@ -87,27 +85,28 @@ pub(super) fn measure_surfaces(
     drying: Res<DryingClock>,
     mut surfaces: Query<Measurable>,
 ) {
-    for (entity, surface, collider, texel, transform, mut measured, mut water, past, deforming) in
+    for (entity, (surface, map), collider, texel, transform, mut measured, mut water, past, deforming) in
         &mut surfaces
     {
         let is_posed = deforming.is_some_and(|deforming| deforming.posed().is_some());
-        let changed = surface.is_changed() || collider.is_changed() || transform.is_changed();
+        let changed =
+            surface.is_changed() || map.is_changed() || collider.is_changed() || transform.is_changed();
+        let (size, wrap) = (map.texels(), surface.wrap());
         // What is being measured is finished first: a surface that keeps turning is measured as fast as that goes.
         let stale = match &measured {
             None => true,
             Some(measured) if measured.task.is_some() => false,
             Some(measured) => {
                 let changed = changed || measured.late;
-                changed && !measured.is_of(&surface, &collider, &transform, is_posed)
+                changed && !measured.is_of((size, wrap), &collider, &transform, is_posed)
             }
         };
-        let (size, wrap) = (surface.texels(), surface.wrap());
         if stale {
             if let Some(water) = &mut water
                 && (water.size, water.wrap) != (size, wrap)
             {
                 // What was on the old maps is gone with them.
-                **water = SurfaceWater::new(&surface, texel.mean_mm2);
+                **water = SurfaceWater::of_size(size, wrap, texel.mean_mm2);
                 commands.entity(entity).remove::<(WetGeometry, Exposure)>();
             }
             let (affine, bvh) = (transform.affine(), collider.0.clone());
@@ -149,7 +148,7 @@ pub(super) fn measure_surfaces(
             entity.remove::<Exposure>();
         }
         if water.is_none() {
-            entity.insert(SurfaceWater::new(&surface, texel.mean_mm2));
+            entity.insert(SurfaceWater::of_size(size, wrap, texel.mean_mm2));
         }
     }
 }
@@ -230,6 +229,11 @@ pub(crate) fn put_matter(world: &mut World, surface: Entity, material: PorousMat
     if let Ok(mut entity) = world.get_entity_mut(surface) {
         entity.insert((material, FormerMaterial(material)));
     }
+}
+
+/// A surface without maps has no water any more. What is queued for it, and what is falling off it, stays.
+pub(super) fn release_maps(removed: On<Remove, MapSize>, mut commands: Commands) {
+    commands.entity(removed.entity).try_remove::<(WetGeometry, Measured, SurfaceWater, Exposure)>();
 }
 
 /// A surface that is not [`Weatherable`] any more is not wet any more.

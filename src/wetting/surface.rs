@@ -172,11 +172,16 @@ impl<'a> Now<'a> {
 }
 
 impl SurfaceWater {
-    /// Dry maps for a surface whose texels have this mean area, mm².
+    /// Dry maps for a surface, as large as it allows, whose texels have this mean area, mm².
     pub fn new(surface: &Weatherable, mean_mm2: f32) -> Self {
+        Self::of_size(surface.texels(), surface.wrap(), mean_mm2)
+    }
+
+    /// Dry maps with so many texels along each side, of this mean area, mm², and these edges.
+    pub fn of_size(size: u32, wrap: [Wrap; 2], mean_mm2: f32) -> Self {
         Self {
-            size: surface.texels(),
-            wrap: surface.wrap(),
+            size,
+            wrap,
             units: Units::for_area(mean_mm2),
             texels: Vec::new(),
             marks: Vec::new(),

@@ -23,7 +23,7 @@ pub enum Command {
     Check(CheckArgs),
     /// Print the JSON Schema of scenario files
     Schema,
-    /// Open a scenario in a window
+    /// Open a scenario or a model in a window, to play with
     Sandbox(SandboxArgs),
     /// Make a wet map: what of a surface gets wet first
     #[command(subcommand)]
@@ -36,14 +36,22 @@ pub enum Command {
 
 #[derive(Args, Debug)]
 pub struct ReplayArgs {
-    /// The scenario; exit code 1 if one of its expectations does not hold
-    pub file: PathBuf,
+    /// The scenario, exit code 1 if one of its expectations does not hold; of several, each is run by a program of its own and
+    /// has its own folder in --out, named after its file
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
     /// One of its variants
     #[arg(long)]
     pub variant: Option<String>,
-    /// Folder for frame_00000.png, ..., maps/ and report.json; without it the report goes to standard output
+    /// Folder for pictures, maps, series, plots and report.json; without it the report goes to standard output
     #[arg(long)]
     pub out: Option<PathBuf>,
+    /// As many scenarios at a time; also for a single file, whose folder is in --out then [default: 1]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    pub jobs: Option<u32>,
+    /// Of the files, run only the one of this number, from 0
+    #[arg(long, value_name = "INDEX")]
+    pub only: Option<usize>,
     /// Pictures per second of weather time
     #[arg(long, default_value_t = 24)]
     pub fps: u32,
@@ -68,6 +76,26 @@ pub struct ReplayArgs {
     /// Simulate only; needs no graphics driver, and gives the same digest
     #[arg(long)]
     pub no_render: bool,
+    /// Seconds of weather time between two rows of series.csv [default: 1]
+    #[arg(long, value_name = "SECONDS")]
+    pub every: Option<f32>,
+    /// Make a video of the pictures: video.mp4 with ffmpeg, or else video.apng
+    #[arg(long, requires = "out", conflicts_with = "no_render")]
+    pub video: bool,
+    /// Make sheet.png of so many of the pictures, with their times; 12 if no number is given
+    #[arg(long, value_name = "PICTURES", num_args = 0..=1, require_equals = true, default_missing_value = "12")]
+    #[arg(requires = "out", conflicts_with = "no_render")]
+    pub sheet: Option<u32>,
+    /// End when standard input does, as it does when whoever holds the other end of it is gone
+    #[arg(long, hide = true)]
+    pub end_with_input: bool,
+}
+
+impl ReplayArgs {
+    /// Whether each scenario gets a program and a folder of its own.
+    pub fn is_batch(&self) -> bool {
+        self.files.len() > 1 || self.jobs.is_some() || self.only.is_some()
+    }
 }
 
 #[derive(Args, Debug)]
@@ -82,13 +110,13 @@ pub struct CheckArgs {
 
 #[derive(Args, Debug)]
 pub struct SandboxArgs {
-    /// The scenario
+    /// A scenario (.ron), or a model by itself (.glb, .gltf)
     #[arg(default_value = "assets/scenarios/hose.ron")]
     pub file: PathBuf,
     /// One of its variants
     #[arg(long)]
     pub variant: Option<String>,
-    /// Folder for screenshots
+    /// Folder for screenshots and saved scenes
     #[arg(long, default_value = "out")]
     pub out: PathBuf,
 }

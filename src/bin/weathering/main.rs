@@ -1,5 +1,6 @@
 //! `weathering`: replays scenarios to pictures and numbers, and opens them to play with.
 
+mod batch;
 mod check;
 mod cli;
 mod replay;

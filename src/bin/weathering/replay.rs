@@ -1,6 +1,7 @@
 //! `weathering replay`.
 
 use std::error::Error;
+use std::path::Path;
 use std::process::ExitCode;
 
 use bevy::log::tracing_subscriber;
@@ -8,11 +9,22 @@ use bevy_weathering::replay::{ReplayOptions, replay};
 use bevy_weathering::scenario::{Expectation, ExpectationOutcome, Scenario};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::batch;
 use crate::cli::ReplayArgs;
 
 /// Exit code 1 if something was not as the scenario expects it.
 pub fn run(arguments: &ReplayArgs) -> Result<ExitCode, Box<dyn Error>> {
     tracing_subscriber::fmt().with_max_level(bevy::log::Level::WARN).with_writer(std::io::stderr).init();
+    match arguments.files.as_slice() {
+        [file] if !arguments.is_batch() => run_one(file, arguments),
+        _ => batch::run(arguments).map(|()| ExitCode::SUCCESS),
+    }
+}
+
+fn run_one(file: &Path, arguments: &ReplayArgs) -> Result<ExitCode, Box<dyn Error>> {
+    if arguments.end_with_input {
+        batch::end_with_input();
+    }
     let options = ReplayOptions {
         out: arguments.out.clone(),
         fps: arguments.fps,
@@ -23,7 +35,10 @@ pub fn run(arguments: &ReplayArgs) -> Result<ExitCode, Box<dyn Error>> {
         render: !arguments.no_render,
         resume: arguments.resume.clone(),
         save: arguments.save_state.clone(),
-        ..ReplayOptions::new(Scenario::load_variant(&arguments.file, arguments.variant.as_deref())?)
+        every: arguments.every,
+        video: arguments.video,
+        sheet: arguments.sheet,
+        ..ReplayOptions::new(Scenario::load_variant(file, arguments.variant.as_deref())?)
     };
     let bar = ProgressBar::no_length().with_style(
         ProgressStyle::with_template("{bar:40} tick {pos}/{len}, {elapsed} gone, {eta} to go")

@@ -7,11 +7,11 @@ use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat, T
 use bevy::render::storage::ShaderBuffer;
 
 use crate::matter::GpuTexelMatter;
-use crate::overlay::{RainRing, TILE_SIZE, Weatherable, Wrap, mip_levels};
+use crate::overlay::{MapSize, RainRing, SplatQueue, TILE_SIZE, Weatherable, Wrap, mip_levels};
 use crate::wetting::gpu::GpuTexelWater;
 
-/// The maps of a surface on the GPU. Begin empty; all zeros mean "nothing here". The three images have
-/// [`mip_levels`] levels, which follow what is painted.
+/// The maps of a surface on the GPU. Begin empty; all zeros mean "nothing here". Each is as small as can be until there is
+/// something to put there. The three images have [`mip_levels`] levels, which follow what is painted.
 #[derive(Component, Reflect, Debug, Clone)]
 #[reflect(Component)]
 pub struct Overlays {
@@ -19,7 +19,8 @@ pub struct Overlays {
     pub size: u32,
     /// Edge behaviour along u and v.
     pub wrap: [Wrap; 2],
-    /// Colour over the surface's; linear `rgba8unorm`, premultiplied.
+    /// Colour over the surface's; linear `rgba8unorm`, premultiplied. This and the next two are a tile each while nothing has
+    /// been painted.
     pub diffuse: Handle<Image>,
     /// Reflectance, smoothness, unused, coverage; `rgba8unorm`, premultiplied.
     pub specular: Handle<Image>,
@@ -34,25 +35,28 @@ pub struct Overlays {
     pub matter: Handle<ShaderBuffer>,
     /// `matter` has room for all texels.
     pub has_matter_room: bool,
-    /// [`RainRing::PER_TILE`] [`RainRing`]s of each tile, row by row.
+    /// [`RainRing::PER_TILE`] [`RainRing`]s of each tile, row by row; those of a single one while nothing has been painted.
     pub rings: Handle<ShaderBuffer>,
+    /// The colour maps and `rings` have room for all texels.
+    pub has_colors: bool,
 }
 
 impl Overlays {
-    fn new(surface: &Weatherable, images: &mut Assets<Image>, buffers: &mut Assets<ShaderBuffer>) -> Self {
-        let size = surface.texels();
-        let mut image = |name| images.add(overlay_image(size, surface.wrap(), name));
-        let (diffuse, specular, normal) =
-            (image("diffuse overlay"), image("specular overlay"), image("normal overlay"));
+    fn new(
+        size: u32,
+        wrap: [Wrap; 2],
+        images: &mut Assets<Image>,
+        buffers: &mut Assets<ShaderBuffer>,
+    ) -> Self {
+        let [diffuse, specular, normal] = overlay_images(TILE_SIZE, wrap, images);
         // wgpu zeroes what is created without data.
         let mut buffer = |bytes| buffers.add(ShaderBuffer::with_size(bytes, RenderAssetUsages::RENDER_WORLD));
         let state = buffer(size_of::<GpuTexelWater>());
         let matter = buffer(size_of::<GpuTexelMatter>());
-        let tiles = (size / TILE_SIZE).pow(2);
-        let rings = buffer((tiles * RainRing::PER_TILE) as usize * size_of::<RainRing>());
+        let rings = buffer(ring_bytes(TILE_SIZE));
         Self {
             size,
-            wrap: surface.wrap(),
+            wrap,
             diffuse,
             specular,
             normal,
@@ -61,8 +65,28 @@ impl Overlays {
             matter,
             has_matter_room: false,
             rings,
+            has_colors: false,
         }
     }
+
+    /// Makes room for what is painted.
+    pub(crate) fn open_colors(&mut self, images: &mut Assets<Image>, buffers: &mut Assets<ShaderBuffer>) {
+        [self.diffuse, self.specular, self.normal] = overlay_images(self.size, self.wrap, images);
+        let rings = ShaderBuffer::with_size(ring_bytes(self.size), RenderAssetUsages::RENDER_WORLD);
+        self.rings = buffers.add(rings);
+        self.has_colors = true;
+    }
+}
+
+/// Bytes of the rings of maps with so many texels along each side.
+fn ring_bytes(size: u32) -> usize {
+    ((size / TILE_SIZE).pow(2) * RainRing::PER_TILE) as usize * size_of::<RainRing>()
+}
+
+/// Empty colour maps: diffuse, specular, normal.
+fn overlay_images(size: u32, wrap: [Wrap; 2], images: &mut Assets<Image>) -> [Handle<Image>; 3] {
+    ["diffuse overlay", "specular overlay", "normal overlay"]
+        .map(|name| images.add(overlay_image(size, wrap, name)))
 }
 
 fn overlay_image(size: u32, wrap: [Wrap; 2], name: &'static str) -> Image {
@@ -93,9 +117,28 @@ pub(super) fn add_overlays(
     mut commands: Commands,
     mut images: ResMut<Assets<Image>>,
     mut buffers: ResMut<Assets<ShaderBuffer>>,
-    changed: Query<(Entity, &Weatherable), Changed<Weatherable>>,
+    changed: Query<(Entity, &Weatherable, &MapSize), Or<(Changed<Weatherable>, Changed<MapSize>)>>,
 ) {
-    for (entity, surface) in &changed {
-        commands.entity(entity).insert(Overlays::new(surface, &mut images, &mut buffers));
+    for (entity, surface, size) in &changed {
+        let overlays = Overlays::new(size.texels(), surface.wrap(), &mut images, &mut buffers);
+        commands.entity(entity).insert(overlays);
     }
+}
+
+/// Makes room on surfaces for which the first splats wait.
+pub(super) fn open_overlays(
+    mut images: ResMut<Assets<Image>>,
+    mut buffers: ResMut<Assets<ShaderBuffer>>,
+    mut surfaces: Query<(&mut Overlays, &SplatQueue)>,
+) {
+    for (mut overlays, queue) in &mut surfaces {
+        if !overlays.has_colors && !queue.is_empty() {
+            overlays.open_colors(&mut images, &mut buffers);
+        }
+    }
+}
+
+/// Drops the maps of a surface that has lost its size.
+pub(super) fn release_overlays(removed: On<Remove, MapSize>, mut commands: Commands) {
+    commands.entity(removed.entity).try_remove::<Overlays>();
 }

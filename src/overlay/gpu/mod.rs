@@ -1,10 +1,10 @@
 //! Painting splats on the GPU: one compute pass before the cameras draw.
 //!
-//! Main world: every surface gets textures and buffers ([`Overlays`]). Extract moves the waiting splats over
-//! (each exactly once, however many ticks the frame held). Prepare sorts them into tiles and uploads them; until
-//! the pipeline and the maps exist, they wait, and so does what is beyond the frame's [`SplatBudget`]. The pass dispatches one
-//! workgroup per touched tile: a surface without new splats costs nothing, which [`SplatStats`] shows. Then the touched tiles are halved into the mip maps of the
-//! colour maps (`mips.rs`).
+//! Main world: every surface gets textures and buffers ([`Overlays`]), of full size once something is to be painted. Extract
+//! moves the waiting splats over (each exactly once, however many ticks the frame held). Prepare sorts them into tiles and
+//! uploads them; until the pipeline and the maps exist, they wait, and so does what is beyond the frame's [`SplatBudget`]. The
+//! pass dispatches one workgroup per touched tile: a surface without new splats costs nothing, which [`SplatStats`] shows. Then
+//! the touched tiles are halved into the mip maps of the colour maps (`mips.rs`).
 
 mod backlog;
 mod hold;
@@ -22,7 +22,7 @@ use bevy::render::{ExtractSchedule, Render, RenderApp, RenderStartup, RenderSyst
 use bevy::shader::load_shader_library;
 
 use super::deposit::{deposit_splats, note_traces};
-use super::{SplatBudget, SplatQueue};
+use super::{SizeMaps, SplatBudget, SplatQueue};
 use crate::schedule::{TickHold, WeatheringSystems, WeatheringTick};
 
 pub use maps::Overlays;
@@ -50,7 +50,16 @@ impl Plugin for GpuOverlayPlugin {
             .register_type::<SplatBudget>()
             .init_resource::<SplatBudget>()
             .init_resource::<TickHold>()
-            .add_systems(PreUpdate, (maps::add_overlays, hold::hold_ticks))
+            .add_observer(maps::release_overlays)
+            .add_systems(
+                PreUpdate,
+                (
+                    // Of maps whose size has been decided; what has waited since the last tick gets its room at once.
+                    (maps::add_overlays, maps::open_overlays).chain().after(SizeMaps),
+                    // What is taken away with its maps waits no more.
+                    hold::hold_ticks.after(SizeMaps),
+                ),
+            )
             .add_systems(
                 WeatheringTick,
                 // Counts what this tick has put down.

@@ -107,11 +107,13 @@ pub(super) fn extract_splats(
             }
             if waiting.maps.rings != maps.rings {
                 // New maps: what was meant for the old ones is gone with them.
+                stats.drop_splats(waiting.backlog.len());
                 waiting.backlog.clear();
             }
             waiting.maps = maps;
         }
-        if queue.is_empty() {
+        // Splats for which there is no room yet wait where they are.
+        if queue.is_empty() || !overlays.has_colors {
             continue;
         }
         let index = *by_entity.entry(entity).or_insert_with(|| {
@@ -135,9 +137,16 @@ pub(super) fn extract_splats(
         }
         waiting.backlog.take_from(&mut queue);
     }
+    // Despawned, or without maps; what is kept here for it goes, too.
     let gone = |waiting: &PendingSurface| main_world.get::<Overlays>(waiting.entity).is_none();
     if surfaces.iter().any(gone) {
-        surfaces.retain(|waiting| !gone(waiting));
+        surfaces.retain(|waiting| {
+            let gone = gone(waiting);
+            if gone {
+                stats.drop_splats(waiting.backlog.len());
+            }
+            !gone
+        });
         by_entity.clear();
         by_entity.extend(surfaces.iter().enumerate().map(|(index, waiting)| (waiting.entity, index)));
     }
@@ -356,6 +365,7 @@ mod tests {
             matter: default(),
             has_matter_room: false,
             rings: default(),
+            has_colors: true,
         };
         let surface = main.spawn((overlays, SplatQueue::default())).id();
         let mut render = World::new();
@@ -404,11 +414,13 @@ mod tests {
         push(&mut render, surface, 3..4);
         schedule.run(&mut render);
         assert_eq!(pending(&render), [3]);
+        assert_eq!(render.resource::<SplatStats>().dropped(), 3);
         // Also if nothing new comes: it could never be painted.
         let other = Handle::Uuid(bevy::asset::uuid::Uuid::from_u128(8), std::marker::PhantomData);
         render.resource_mut::<MainWorld>().get_mut::<Overlays>(surface).unwrap().rings = other;
         schedule.run(&mut render);
-        assert_eq!((pending(&render), render.resource::<SplatStats>().pending()), (vec![], 0));
+        let stats = render.resource::<SplatStats>();
+        assert_eq!((pending(&render), stats.pending(), stats.dropped()), (vec![], 0, 4));
     }
 
     #[test]

@@ -15,6 +15,7 @@ struct Counters {
     dispatches: AtomicU64,
     tiles: AtomicU64,
     carried: AtomicU64,
+    dropped: AtomicU64,
     pending: AtomicU64,
 }
 
@@ -39,6 +40,11 @@ impl SplatStats {
         self.0.carried.load(Ordering::Relaxed)
     }
 
+    /// Splats that were dropped with the maps they were meant for.
+    pub fn dropped(&self) -> u64 {
+        self.0.dropped.load(Ordering::Relaxed)
+    }
+
     /// Splats that wait in the render world now, for whatever reason.
     pub fn pending(&self) -> u64 {
         self.0.pending.load(Ordering::Relaxed)
@@ -52,6 +58,10 @@ impl SplatStats {
 
     pub(super) fn carry(&self, splats: usize) {
         self.0.carried.fetch_add(splats as u64, Ordering::Relaxed);
+    }
+
+    pub(super) fn drop_splats(&self, splats: usize) {
+        self.0.dropped.fetch_add(splats as u64, Ordering::Relaxed);
     }
 
     pub(super) fn set_pending(&self, splats: usize) {

@@ -12,6 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::EventSpec;
+use crate::overlay::MapBudget;
 use crate::weather::Weather;
 
 pub use emitter::{EmitterKey, EmitterSpec};
@@ -43,6 +44,9 @@ pub struct Scenario {
     /// The most particles in flight, up to [`Self::MAX_PARTICLES`].
     #[serde(default = "default_max_particles")]
     pub max_particles: u32,
+    /// What the maps of all surfaces may take, and how fine they are; left out, it is the app's to say.
+    #[serde(default)]
+    pub map_budget: Option<MapBudgetSpec>,
     /// Where it is seen from.
     pub camera: CameraSpec,
     /// The one light with shadows.
@@ -187,6 +191,40 @@ impl Scenario {
         let WeatherSpec { temperature_c, humidity, sun_w_per_m2, drying_speed } = self.weather;
         let (wind, sun_direction) = (self.wind, self.sun.direction);
         Weather { temperature_c, humidity, wind, sun_direction, sun_w_per_m2, drying_speed }
+    }
+}
+
+/// What the maps of all surfaces may take; see [`MapBudget`].
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct MapBudgetSpec {
+    /// MiB on the GPU, above 0 up to [`Self::MAX_MIB`].
+    pub mib: f32,
+    /// Width of a texel in the world, mm, above 0 up to [`Self::MAX_TEXEL_MM`]; maps are as large as their surfaces say if
+    /// left out.
+    pub texel_mm: Option<f32>,
+}
+
+impl MapBudgetSpec {
+    /// The largest budget: 64 GiB.
+    pub const MAX_MIB: f32 = 65_536.0;
+    /// The widest texel.
+    pub const MAX_TEXEL_MM: f32 = 10_000.0;
+}
+
+impl Default for MapBudgetSpec {
+    fn default() -> Self {
+        let MapBudget { bytes, texel } = MapBudget::default();
+        Self { mib: bytes as f32 / (1u32 << 20) as f32, texel_mm: texel.map(|texel| texel * 1000.0) }
+    }
+}
+
+impl Scenario {
+    /// The budget of the run, if the file has one.
+    pub fn map_budget(&self) -> Option<MapBudget> {
+        let MapBudgetSpec { mib, texel_mm } = self.map_budget?;
+        let bytes = (f64::from(mib) * f64::from(1u32 << 20)) as u64;
+        Some(MapBudget { bytes, texel: texel_mm.map(|mm| mm / 1000.0) })
     }
 }
 

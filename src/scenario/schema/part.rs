@@ -6,14 +6,16 @@ use bevy::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{CameraSpec, EmitterSpec, EnvironmentSpec, MaterialSpec, Scenario, SunSpec, SurfaceSpec};
+use super::{
+    CameraSpec, EmitterSpec, EnvironmentSpec, MapBudgetSpec, MaterialSpec, Scenario, SunSpec, SurfaceSpec,
+};
 use crate::emitter::Flow;
 use crate::scenario::EventSpec;
 
 /// A scenario file. What it leaves out is what the files it includes say, or a default; `seconds` and `camera` have none.
 ///
 /// Parts are laid over each other: the included files in their order, then the file itself, then one of its variants. A
-/// later `seed`, `tick_hz`, `seconds`, `gravity`, `wind`, `max_particles`, `camera`, `sun` or `environment` replaces an
+/// later `seed`, `tick_hz`, `seconds`, `gravity`, `wind`, `max_particles`, `map_budget`, `camera`, `sun` or `environment` replaces an
 /// earlier one, `weather` field by field; materials, variants, surfaces and emitters replace those of the same name and
 /// else come behind the others; `emitter_changes` are made to what is there by then; events are added. Nothing can be taken
 /// away.
@@ -40,6 +42,8 @@ pub struct ScenarioPart {
     pub weather: WeatherPart,
     /// The most particles in flight, 1..=10,000,000.
     pub max_particles: Option<u32>,
+    /// What the maps of all surfaces may take.
+    pub map_budget: Option<MapBudgetSpec>,
     /// Where it is seen from.
     pub camera: Option<CameraSpec>,
     /// The one light with shadows.
@@ -145,6 +149,7 @@ impl ScenarioPart {
             wind: self.wind.unwrap_or_default(),
             weather,
             max_particles: self.max_particles.unwrap_or_else(super::default_max_particles),
+            map_budget: self.map_budget,
             camera: self.camera.ok_or("camera")?,
             sun: self.sun.unwrap_or_default(),
             environment: self.environment,

@@ -18,11 +18,15 @@ pub(in crate::scenario) struct MaterialHandles(
     pub(in crate::scenario) Vec<(Handle<StandardMaterial>, WettingTextures)>,
 );
 
-/// Adds what happens in a scenario.
-pub(in crate::scenario) fn apply_events_plugin(app: &mut App, scenario: &Scenario) {
-    app.insert_resource(Timeline::new(scenario))
-        .insert_resource(Expectations::new(scenario))
-        .init_resource::<MaterialHandles>()
+/// What happens in a scenario that begins.
+pub(in crate::scenario) fn insert_events(world: &mut World, scenario: &Scenario) {
+    world.insert_resource(Timeline::new(scenario));
+    world.insert_resource(Expectations::new(scenario));
+}
+
+/// Lets happen what [`insert_events`] says.
+pub(in crate::scenario) fn apply_events_plugin(app: &mut App) {
+    app.init_resource::<MaterialHandles>()
         .add_systems(
             WeatheringTick,
             (

@@ -28,7 +28,7 @@ pub use events::{
 pub use expect::{ExpectationOutcome, Expectations};
 
 pub(crate) use apply::rewind;
-pub(super) use apply::{MaterialHandles, apply_events_plugin};
+pub(super) use apply::{MaterialHandles, apply_events_plugin, insert_events};
 
 /// How much of a tick a time may be off by rounding.
 const ROUNDING: f64 = 1.0e-6;

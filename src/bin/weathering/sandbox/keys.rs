@@ -1,54 +1,42 @@
-//! Space pauses, R starts over, F12 takes a picture, Escape leaves.
+//! Keys, and the list of them.
 
 use bevy::prelude::*;
-use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
-use bevy_weathering::replay::write_png;
-use bevy_weathering::scenario::{ScenarioStatus, reset_scenario};
+use bevy_egui::egui;
 
-use super::ScreenshotFolder;
+use super::pace::start_over;
+use super::settings::{Settings, Tool};
+use super::ui::{Help, keyboard_is_free};
+
+/// Every key and mouse button, and what it does.
+const KEYS: &[(&str, &str)] = &[
+    ("Left button", "what the tool does: spray, probe, paint"),
+    ("Right button", "turn the camera"),
+    ("Middle button", "move the camera"),
+    ("Wheel", "closer, farther; faster, slower in flight"),
+    ("W A S D Q E", "fly (Shift: faster)"),
+    ("C", "orbit or flight"),
+    ("F", "look at all of the scene"),
+    ("H, I", "hose, probe"),
+    ("1 2 3 4", "brushes: wet, dry, dirty, clean"),
+    ("Ctrl+Z", "take a stroke back"),
+    ("Space", "pause, go on"),
+    ("N", "one tick"),
+    ("R", "start over"),
+    ("U", "hide panels, show them"),
+    ("M, P", "maps, plots"),
+    ("F12", "picture without panels"),
+    ("F11", "begin, end a sequence of pictures"),
+    ("? or F1", "this list"),
+    ("Escape", "leave"),
+];
 
 pub fn plugin(app: &mut App) {
-    app.add_systems(Update, (pause, reset, take_screenshot, leave));
-}
-
-fn pause(keys: Res<ButtonInput<KeyCode>>, status: Res<ScenarioStatus>, mut time: ResMut<Time<Virtual>>) {
-    if keys.just_pressed(KeyCode::Space) && matches!(*status, ScenarioStatus::Ready) {
-        if time.is_paused() {
-            time.unpause()
-        } else {
-            time.pause()
-        }
-        info!("{}", if time.is_paused() { "paused" } else { "running" });
-    }
+    app.add_systems(Update, (reset, leave, choose).run_if(keyboard_is_free));
 }
 
 fn reset(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
     if keys.just_pressed(KeyCode::KeyR) {
-        commands.queue(reset_scenario);
-        info!("started over");
-    }
-}
-
-fn take_screenshot(
-    keys: Res<ButtonInput<KeyCode>>,
-    folder: Res<ScreenshotFolder>,
-    mut commands: Commands,
-    mut count: Local<u32>,
-) {
-    if keys.just_pressed(KeyCode::F12) {
-        let path = loop {
-            let path = folder.0.join(format!("screenshot_{:03}.png", *count));
-            *count += 1;
-            if !path.exists() {
-                break path;
-            }
-        };
-        commands.spawn(Screenshot::primary_window()).observe(move |captured: On<ScreenshotCaptured>| {
-            match write_png(&path, captured.image.clone()) {
-                Ok(()) => info!("saved {}", path.display()),
-                Err(error) => error!("{error}"),
-            }
-        });
+        commands.queue(start_over);
     }
 }
 
@@ -56,4 +44,49 @@ fn leave(keys: Res<ButtonInput<KeyCode>>, mut exit: MessageWriter<AppExit>) {
     if keys.just_pressed(KeyCode::Escape) {
         exit.write(AppExit::Success);
     }
+}
+
+/// Keys that change settings.
+fn choose(keys: Res<ButtonInput<KeyCode>>, mut settings: ResMut<Settings>, mut help: ResMut<Help>) {
+    let pressed = |key| keys.just_pressed(key);
+    if pressed(KeyCode::F1) || pressed(KeyCode::Slash) {
+        help.0 = !help.0;
+    }
+    if pressed(KeyCode::KeyU) {
+        settings.panels = !settings.panels;
+    }
+    if pressed(KeyCode::KeyM) {
+        settings.maps = !settings.maps;
+    }
+    if pressed(KeyCode::KeyP) {
+        settings.plots = !settings.plots;
+    }
+    if pressed(KeyCode::KeyC) {
+        settings.flies = !settings.flies;
+    }
+    for (key, tool) in [
+        (KeyCode::KeyH, Tool::Hose),
+        (KeyCode::KeyI, Tool::Probe),
+        (KeyCode::Digit1, Tool::Wet),
+        (KeyCode::Digit2, Tool::Dry),
+        (KeyCode::Digit3, Tool::Dirty),
+        (KeyCode::Digit4, Tool::Clean),
+    ] {
+        if pressed(key) {
+            settings.tool = tool;
+        }
+    }
+}
+
+/// The list of all keys.
+pub fn show_help(context: &egui::Context, open: &mut bool) {
+    egui::Window::new("Keys").open(open).resizable(false).default_pos([340.0, 60.0]).show(context, |ui| {
+        egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
+            for (key, does) in KEYS {
+                ui.strong(*key);
+                ui.label(*does);
+                ui.end_row();
+            }
+        });
+    });
 }

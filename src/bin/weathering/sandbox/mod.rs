@@ -1,74 +1,132 @@
-//! `weathering sandbox`: a scenario in a window.
+//! `weathering sandbox`: scenes in a window, to play with.
+//!
+//! Each file is a plugin of its own; those that have something to show add a panel to [`ui`].
 
+mod brush;
 mod camera;
+mod effects;
+mod emitters;
+mod hose;
 mod keys;
+mod maps;
+mod materials;
+mod model;
+mod open;
+mod pace;
+mod plots;
+mod probe;
+mod saving;
+mod scenes;
+mod selection;
+mod settings;
+mod shots;
+mod split;
+mod theme;
 mod title;
+mod ui;
+mod undo;
+mod views;
+mod weather;
+mod widgets;
 
 use std::error::Error;
-use std::path::PathBuf;
 
-use bevy::asset::AssetPlugin;
+use bevy::asset::{AssetPlugin, UnapprovedPathMode};
 use bevy::light::DirectionalLightShadowMap;
 use bevy::prelude::*;
 use bevy::render::renderer::RenderAdapterInfo;
+use bevy::window::PrimaryWindow;
 use bevy_weathering::WeatheringPlugins;
-use bevy_weathering::effect::WeatherEffect;
-use bevy_weathering::overload::LiveBudgetPlugin;
+use bevy_weathering::effect::{EffectTable, WeatherEffect};
+use bevy_weathering::overload::{LiveBudget, LiveBudgetPlugin};
 use bevy_weathering::replay::{require_adapter, task_pools};
-use bevy_weathering::scenario::{Scenario, ScenarioPlugin, ScenarioStatus};
+use bevy_weathering::scenario::{AssetTree, ScenarioPlugin};
 
 use crate::cli::SandboxArgs;
 
-/// Where screenshots go.
-#[derive(Resource)]
-struct ScreenshotFolder(PathBuf);
-
 pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
-    let loaded = Scenario::load_variant(&arguments.file, arguments.variant.as_deref())?;
+    let loaded = open::load(&arguments.file, arguments.variant.as_deref())?;
     require_adapter()?;
     if cfg!(target_os = "linux") && std::env::var_os("DISPLAY").is_none() {
         return Err("no display: DISPLAY is not set; use `weathering replay`, or start one (Xvfb)".into());
     }
     let scenario = ScenarioPlugin::new(loaded.clone(), true)?;
     let window = Window { title: "weathering".into(), resolution: (1280, 720).into(), ..default() };
-    let exit = App::new()
-        .add_plugins(
-            DefaultPlugins
-                .set(task_pools(None))
-                .set(WindowPlugin { primary_window: Some(window), ..default() })
-                .set(AssetPlugin {
-                    file_path: loaded.tree.to_string_lossy().into_owned(),
-                    // Effects, stamps and pictures follow their files while one works on them.
-                    watch_for_changes_override: Some(true),
-                    ..default()
-                }),
-        )
-        .add_plugins(WeatheringPlugins)
-        .add_plugins(LiveBudgetPlugin)
-        .add_plugins(scenario)
-        .insert_resource(ScreenshotFolder(arguments.out.clone()))
-        .insert_resource(title::ScenarioName(arguments.file.display().to_string()))
-        .add_plugins((camera::plugin, keys::plugin, title::plugin))
-        .add_systems(Startup, spare_software_renderers)
-        .add_systems(Update, (quit_on_failure, tell_of_reloads))
+    let mut app = App::new();
+    app.add_plugins(
+        DefaultPlugins
+            .set(task_pools(None))
+            .set(WindowPlugin { primary_window: Some(window), ..default() })
+            .set(AssetPlugin {
+                file_path: loaded.tree.to_string_lossy().into_owned(),
+                // Effects, stamps and pictures follow their files while one works on them.
+                watch_for_changes_override: Some(true),
+                // Scenes that are opened later may lie elsewhere. Each is kept within its own tree before it is shown.
+                unapproved_path_mode: UnapprovedPathMode::Allow,
+                ..default()
+            }),
+    )
+    .add_plugins(WeatheringPlugins)
+    // As long as the pace lets ticks take; what is left to do here is fewer particles.
+    .insert_resource(LiveBudget { frame_ms: pace::BUDGET as f32 * 1000.0, ..default() })
+    .add_plugins(LiveBudgetPlugin)
+    .insert_resource(AssetTree(loaded.tree.clone()))
+    .add_plugins(scenario);
+    let is_model = model::is_model(&arguments.file);
+    model::light_shade(app.world_mut(), is_model);
+    if is_model {
+        model::spawn(app.world_mut(), &loaded);
+    }
+    let effects = app.world().resource::<EffectTable>().rows().len();
+    let exit = app
+        .insert_resource(open::Opened { loaded, is_model, effects })
+        .insert_resource(shots::OutFolder(arguments.out.clone()))
+        .add_plugins((ui::plugin, settings::plugin, selection::plugin, camera::plugin))
+        // In the order of their panels.
+        .add_plugins((hose_and_time, scene_panels))
+        .add_plugins((keys::plugin, title::plugin, open::plugin, model::plugin, saving::plugin))
+        .add_systems(PreUpdate, spare_software_renderers)
+        .add_systems(Update, tell_of_reloads)
         .run();
-    if exit.is_error() { Err("the scenario could not be shown; see above".into()) } else { Ok(()) }
+    if exit.is_error() { Err("the scene could not be shown; see above".into()) } else { Ok(()) }
+}
+
+/// What is in the bar.
+fn hose_and_time(app: &mut App) {
+    app.add_plugins((pace::plugin, scenes::plugin, hose::plugin, brush::plugin, undo::plugin));
+}
+
+/// The other panels.
+fn scene_panels(app: &mut App) {
+    app.add_plugins((weather::plugin, emitters::plugin, effects::plugin, materials::plugin)).add_plugins((
+        views::plugin,
+        shots::plugin,
+        probe::plugin,
+        maps::plugin,
+        plots::plugin,
+        split::plugin,
+    ));
 }
 
 /// Without a GPU, fluency is worth more than smooth edges.
 fn spare_software_renderers(
     mut commands: Commands,
     adapter: Res<RenderAdapterInfo>,
-    cameras: Query<Entity, With<Camera3d>>,
-    mut windows: Query<&mut Window>,
+    cameras: Query<Entity, Added<Camera3d>>,
+    mut windows: Query<&mut Window, With<PrimaryWindow>>,
+    mut is_small: Local<bool>,
 ) {
-    if adapter.device_type == wgpu::DeviceType::Cpu {
+    if adapter.device_type != wgpu::DeviceType::Cpu {
+        return;
+    }
+    for camera in &cameras {
+        commands.entity(camera).insert(Msaa::Off);
+    }
+    if !*is_small {
+        *is_small = true;
         commands.insert_resource(DirectionalLightShadowMap { size: 1024 });
-        for camera in &cameras {
-            commands.entity(camera).insert(Msaa::Off);
-        }
         for mut window in &mut windows {
-            window.resolution.set(800.0, 450.0);
+            window.resolution.set(960.0, 540.0);
         }
     }
 }
@@ -81,12 +139,5 @@ fn tell_of_reloads(mut events: MessageReader<AssetEvent<WeatherEffect>>, server:
         {
             info!("read again: {path}");
         }
-    }
-}
-
-fn quit_on_failure(status: Res<ScenarioStatus>, mut exit: MessageWriter<AppExit>) {
-    if let ScenarioStatus::Failed(error) = &*status {
-        error!("{error}");
-        exit.write(AppExit::error());
     }
 }

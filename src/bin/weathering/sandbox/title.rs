@@ -1,4 +1,4 @@
-//! The window's title says which scenario it is, whether it loads, runs or stands still, and what is held back if the machine
+//! The window's title says which scene it is, whether it loads, runs or stands still, and what is held back if the machine
 //! cannot keep up.
 
 use std::fmt::Write;
@@ -9,9 +9,7 @@ use bevy_weathering::overlay::SplatStats;
 use bevy_weathering::overload::LiveLoad;
 use bevy_weathering::scenario::ScenarioStatus;
 
-/// Name of what is shown.
-#[derive(Resource)]
-pub struct ScenarioName(pub String);
+use super::open::Opened;
 
 /// Seconds between two looks at the load: a title that flickers cannot be read.
 const PATIENCE: f32 = 0.5;
@@ -73,7 +71,7 @@ impl HeldBack {
 }
 
 fn name_window(
-    name: Res<ScenarioName>,
+    opened: Res<Opened>,
     status: Res<ScenarioStatus>,
     time: Res<Time<Virtual>>,
     real: Res<Time<Real>>,
@@ -95,8 +93,9 @@ fn name_window(
         held_back = HeldBack::new(&load, &splats);
     }
     let now = Shown { state, held_back };
-    if shown.replace(now) != Some(now) {
-        window.title = format!("weathering - {}{} ({state})", name.0, held_back.text());
+    if shown.replace(now) != Some(now) || opened.is_changed() {
+        let file = opened.loaded.file.display();
+        window.title = format!("weathering - {file}{} ({state})", held_back.text());
     }
 }
 

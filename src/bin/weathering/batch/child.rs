@@ -1,0 +1,92 @@
+//! Programs that run one scenario each. What one of them does, or suffers, does not touch the others.
+
+use std::error::Error;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// Starts children of this very program.
+pub struct Children {
+    program: PathBuf,
+    hash: String,
+    /// Threads that each may use.
+    threads: Option<usize>,
+}
+
+/// What became of a child.
+pub struct Ran {
+    /// Why it failed, if it did.
+    pub result: Result<(), String>,
+    /// What it wrote to its standard error, but for what is in `result`.
+    pub said: String,
+}
+
+impl Children {
+    /// `threads`: as told for each; otherwise they share the cores when several run at a time.
+    ///
+    /// # Errors
+    /// If this program cannot be found or read.
+    pub fn new(threads: Option<usize>, at_a_time: usize) -> Result<Self, Box<dyn Error>> {
+        let program = std::env::current_exe()?;
+        let bytes = std::fs::read(&program)
+            .map_err(|error| format!("cannot read the program, {}: {error}", program.display()))?;
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let share = (at_a_time > 1).then(|| (cores / at_a_time).max(1));
+        let hash = blake3::hash(&bytes).to_hex().to_string();
+        Ok(Self { program, hash, threads: threads.or(share) })
+    }
+
+    /// Hash of the program: another one may come to other results.
+    pub fn program_hash(&self) -> &str {
+        &self.hash
+    }
+
+    /// Runs a scenario to its end.
+    pub fn run(&self, file: &Path, out: &Path, arguments: &[String]) -> Ran {
+        let mut command = Command::new(&self.program);
+        command.arg("replay").arg("--out").arg(out).args(arguments).arg("--end-with-input");
+        if let Some(threads) = self.threads {
+            command.args(["--threads", &threads.to_string()]);
+        }
+        // A file may be called like an option.
+        command.arg("--").arg(file);
+        match finish(command) {
+            Ok(ran) => ran,
+            Err(error) => Ran { result: Err(format!("cannot be started: {error}")), said: String::new() },
+        }
+    }
+}
+
+fn finish(mut command: Command) -> io::Result<Ran> {
+    command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
+    // What it says is read by this program first.
+    command.env("NO_COLOR", "1");
+    let mut child = command.spawn()?;
+    // Held until the child has ended; it is let go, too, if this program is killed, and then the child ends.
+    let held = child.stdin.take();
+    let output = child.wait_with_output()?;
+    drop(held);
+    let text = String::from_utf8_lossy(&output.stderr);
+    if output.status.success() {
+        return Ok(Ran { result: Ok(()), said: text.into_owned() });
+    }
+    // The last error tells why; where there is none, the last line.
+    let mut lines: Vec<&str> = text.lines().filter(|line| !line.trim().is_empty()).collect();
+    let error = lines.iter().rposition(|line| line.starts_with("error: "));
+    let reason = error.or(lines.len().checked_sub(1)).map(|at| lines.remove(at));
+    let reason = reason.map(|line| line.strip_prefix("error: ").unwrap_or(line).to_owned());
+    let reason = reason.unwrap_or_else(|| output.status.to_string());
+    Ok(Ran { result: Err(reason), said: lines.join("\n") })
+}
+
+/// Ends this program, whatever it is at, when its standard input ends: nobody waits for its results any more, and somebody else
+/// may begin the same folder anew. What it was writing is not there under its name.
+pub fn end_with_input() {
+    std::thread::spawn(exit_after_input);
+}
+
+fn exit_after_input() {
+    // An error is an end, too.
+    let _ = io::copy(&mut io::stdin().lock(), &mut io::sink());
+    std::process::exit(3);
+}

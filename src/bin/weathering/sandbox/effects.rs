@@ -1,0 +1,209 @@
+//! What the hose in the hand and the rain over the scene send out: the effects that come with the project, whatever scenario
+//! is open; and a panel to edit all that are in use.
+
+use bevy::prelude::*;
+use bevy_egui::egui;
+use bevy_weathering::effect::{Carries, DropSizes, EffectTable, WeatherEffect};
+use bevy_weathering::emitter::Emitter;
+
+use super::theme;
+use super::ui::{AddPanel, Place};
+use super::widgets::number;
+
+/// Names and texts.
+const SHIPPED: [(&str, &str); 7] = [
+    ("hose", include_str!("../../../../assets/effects/hose.effect.ron")),
+    ("rain", include_str!("../../../../assets/effects/rain.effect.ron")),
+    ("drizzle", include_str!("../../../../assets/effects/drizzle.effect.ron")),
+    ("soak", include_str!("../../../../assets/effects/soak.effect.ron")),
+    ("snow", include_str!("../../../../assets/effects/snow.effect.ron")),
+    ("dust", include_str!("../../../../assets/effects/dust.effect.ron")),
+    ("mud", include_str!("../../../../assets/effects/mud.effect.ron")),
+];
+
+/// The effects that come with the project, by name. Made when they are first asked for.
+#[derive(Resource, Default)]
+pub struct Shipped([Option<Handle<WeatherEffect>>; SHIPPED.len()]);
+
+/// Names of the effects that come with the project.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    SHIPPED.iter().map(|(name, _)| *name)
+}
+
+/// An effect that comes with the project.
+pub fn shipped(world: &mut World, name: &str) -> Option<Handle<WeatherEffect>> {
+    let index = SHIPPED.iter().position(|(known, _)| *known == name)?;
+    if let Some(handle) = &world.resource::<Shipped>().0[index] {
+        return Some(handle.clone());
+    }
+    let made = WeatherEffect::from_ron(SHIPPED[index].1.as_bytes()).and_then(WeatherEffect::with_stamps);
+    let effect = made.map_err(|error| error!("effect {name}: {error}")).ok()?;
+    let handle = world.resource_mut::<Assets<WeatherEffect>>().add(effect);
+    world.resource_mut::<Shipped>().0[index] = Some(handle.clone());
+    Some(handle)
+}
+
+/// The effect that is being edited.
+#[derive(Resource, Default)]
+struct Edited(Option<AssetId<WeatherEffect>>);
+
+pub fn plugin(app: &mut App) {
+    app.init_resource::<Shipped>().init_resource::<Edited>().add_panel(Place::Side, "Effects", show);
+}
+
+/// Effects in use, with a name to know them by.
+fn in_use(world: &mut World) -> Vec<(String, Handle<WeatherEffect>)> {
+    let mut emitters = world.query::<(&Emitter, Option<&Name>)>();
+    let of_emitters: Vec<_> = emitters
+        .iter(world)
+        .map(|(emitter, name)| {
+            let name = name.map_or_else(|| "emitter".to_owned(), ToString::to_string);
+            (name, emitter.effect.clone())
+        })
+        .collect();
+    let shipped = &world.resource::<Shipped>().0;
+    let rows = world.resource::<EffectTable>().rows();
+    let named = |handle: &Handle<WeatherEffect>| {
+        let by_name =
+            SHIPPED.iter().zip(shipped).find(|(_, known)| matches!(known, Some(known) if known == handle));
+        let by_emitter = of_emitters.iter().find(|(_, effect)| effect == handle);
+        by_name
+            .map(|((name, _), _)| (*name).to_owned())
+            .or_else(|| by_emitter.map(|(name, _)| format!("of {name}")))
+    };
+    rows.iter()
+        .enumerate()
+        .map(|(index, row)| {
+            let name = named(&row.handle).unwrap_or_else(|| match index {
+                0 => "drips".into(),
+                1 => "lumps of snow".into(),
+                _ => format!("effect {index}"),
+            });
+            (name, row.handle.clone())
+        })
+        .collect()
+}
+
+fn show(ui: &mut egui::Ui, world: &mut World) {
+    let all = in_use(world);
+    let mut chosen = world.resource::<Edited>().0;
+    if !all.iter().any(|(_, handle)| Some(handle.id()) == chosen) {
+        chosen = all.last().map(|(_, handle)| handle.id());
+    }
+    let Some((name, handle)) = all.iter().find(|(_, handle)| Some(handle.id()) == chosen) else {
+        ui.label("Nothing is in use yet.");
+        return;
+    };
+    egui::ComboBox::from_label("effect").selected_text(name.as_str()).show_ui(ui, |ui| {
+        for (name, handle) in &all {
+            ui.selectable_value(&mut chosen, Some(handle.id()), name.as_str());
+        }
+    });
+    world.resource_mut::<Edited>().0 = chosen;
+    let Some(before) = world.resource::<Assets<WeatherEffect>>().get(handle).cloned() else {
+        ui.label("It is made in code and cannot be edited.");
+        return;
+    };
+    let mut effect = before.clone();
+    edit(ui, &mut effect);
+    if effect == before {
+        return;
+    }
+    match effect.validate() {
+        Ok(()) => {
+            if let Some(mut asset) = world.resource_mut::<Assets<WeatherEffect>>().get_mut(handle) {
+                *asset = effect;
+            }
+        }
+        Err(error) => {
+            ui.colored_label(theme::WARNING, error.to_string());
+        }
+    }
+}
+
+/// The numbers of an effect.
+fn edit(ui: &mut egui::Ui, effect: &mut WeatherEffect) {
+    ui.heading("What a particle carries");
+    carries(ui, &mut effect.carries);
+    number(
+        ui,
+        "volume, mm3",
+        &mut effect.volume_mm3,
+        (0.0, 10_000.0),
+        "Of a particle, if its emitter has no flow of its own",
+    );
+    match &mut effect.drops {
+        DropSizes::Same(mm) => number(ui, "drops, mm", mm, (0.01, 20.0), "Their diameter; all alike"),
+        DropSizes::MarshallPalmer(rate) => {
+            number(ui, "drops of rain, mm/h", rate, (0.1, 300.0), "Sizes after Marshall and Palmer")
+        }
+    }
+    ui.heading("How it flies");
+    let mut is_given = effect.terminal_speed.is_some();
+    if ui.checkbox(&mut is_given, "own terminal speed").changed() {
+        effect.terminal_speed = is_given.then_some(9.0);
+    }
+    if let Some(speed) = &mut effect.terminal_speed {
+        number(ui, "v_t, m/s", speed, (0.0, 100.0), "At which drag balances gravity; 0 is no drag, no wind");
+    }
+    number(ui, "gravity", &mut effect.gravity_scale, (-2.0, 2.0), "Multiplies gravity");
+    number(ui, "flutter, m/s", &mut effect.flutter, (0.0, 10.0), "Swaying in still air");
+    ui.heading("The mark it leaves");
+    let mut is_given = effect.stamp_radius.is_some();
+    if ui.checkbox(&mut is_given, "own radius").changed() {
+        effect.stamp_radius = is_given.then_some(0.02);
+    }
+    if let Some(radius) = &mut effect.stamp_radius {
+        number(ui, "radius, m", radius, (0.001, 1.0), "Of a particle with the volume above");
+    }
+    number(ui, "jitter", &mut effect.stamp_radius_jitter, (0.0, 0.9), "Radius times 1 plus or minus this");
+    number(ui, "stretch", &mut effect.stamp_stretch, (0.0, 7.0), "How much longer than wide, aslant");
+    number(ui, "splash", &mut effect.splash, (0.0, 0.5), "Part of the water that is thrown up again");
+    number(ui, "bump", &mut effect.bump, (-1.0, 1.0), "Sine of the slope at its rim");
+    for (label, paint) in [("colour", &mut effect.diffuse), ("gloss", &mut effect.specular)] {
+        ui.horizontal(|ui| {
+            ui.color_edit_button_rgb(&mut paint.color);
+            number(ui, label, &mut paint.opacity, (0.0, 1.0), "Opacity in its middle");
+        });
+    }
+    ui.heading("How a particle looks");
+    ui.horizontal(|ui| {
+        ui.color_edit_button_rgba_unmultiplied(&mut effect.look.color);
+        ui.label("colour, opacity");
+    });
+    number(ui, "width, m", &mut effect.look.width, (0.0, 0.1), "Of the streak");
+    number(ui, "exposure, s", &mut effect.look.exposure, (0.0, 0.1), "How long the shutter is open");
+    number(ui, "crown, m", &mut effect.look.splash, (0.0, 0.2), "Height of the splash");
+}
+
+fn carries(ui: &mut egui::Ui, carries: &mut Carries) {
+    ui.horizontal_wrapped(|ui| {
+        let is_mud = matches!(carries, Carries::Mud(_));
+        for (kind, name) in [(Carries::Water, "water"), (Carries::Dust, "dust"), (Carries::Snow, "snow")] {
+            ui.selectable_value(carries, kind, name);
+        }
+        if ui.selectable_label(is_mud, "mud").clicked() && !is_mud {
+            *carries = Carries::Mud(0.4);
+        }
+    });
+    if let Carries::Mud(water) = carries {
+        ui.add(egui::Slider::new(water, 0.0..=1.0).text("water in it"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_comes_with_the_project_can_be_used() {
+        let mut world = World::new();
+        world.init_resource::<Shipped>();
+        world.init_resource::<Assets<WeatherEffect>>();
+        for name in names() {
+            let handle = shipped(&mut world, name).expect(name);
+            assert_eq!(shipped(&mut world, name), Some(handle), "made twice");
+        }
+        assert_eq!(shipped(&mut world, "no such effect"), None);
+    }
+}

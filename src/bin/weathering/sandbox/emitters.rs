@@ -1,0 +1,138 @@
+//! All emitters: how much, how wide, of what, on or off.
+
+use bevy::prelude::*;
+use bevy_egui::egui;
+use bevy_weathering::emitter::{Emitter, EmitterShape, EmitterState, Flow};
+use bevy_weathering::particle::{ParticleConfig, ParticleCounts};
+use bevy_weathering::scenario::{ByHand, SceneEntity};
+
+use super::effects;
+use super::hose::InHand;
+use super::split::CopyOf;
+use super::ui::{AddPanel, Place};
+use super::weather::OwnRain;
+use super::widgets::number;
+
+pub fn plugin(app: &mut App) {
+    app.add_panel(Place::Side, "Emitters", show);
+}
+
+fn show(ui: &mut egui::Ui, world: &mut World) {
+    let counts = *world.resource::<ParticleCounts>();
+    ui.label(format!("{} particles in flight, {} hits", counts.alive, counts.hit));
+    if counts.refused > 0 {
+        let most = world.resource::<ParticleConfig>().max_alive;
+        ui.label(format!("{} not sent: at most {most} may be in flight", counts.refused));
+    }
+    // Those in the hand and over the scene have panels of their own.
+    let mut query =
+        world.query_filtered::<(Entity, &Emitter, Option<&Name>), (Without<InHand>, Without<OwnRain>, Without<CopyOf>)>();
+    let mut all: Vec<(u32, Entity, String)> = query
+        .iter(world)
+        .map(|(entity, emitter, name)| {
+            (emitter.stream, entity, name.map_or_else(|| "emitter".to_owned(), ToString::to_string))
+        })
+        .collect();
+    all.sort_unstable();
+    if all.is_empty() {
+        ui.label("The scene has no emitters.");
+    }
+    for (_, entity, name) in all {
+        egui::CollapsingHeader::new(name).id_salt(entity).default_open(true).show(ui, |ui| {
+            show_emitter(ui, world, entity);
+        });
+    }
+}
+
+fn show_emitter(ui: &mut egui::Ui, world: &mut World, entity: Entity) {
+    let Some(before) = world.get::<Emitter>(entity).cloned() else { return };
+    let mut emitter = before.clone();
+    let mut by_hand = world.get::<ByHand>(entity).is_some();
+    let is_scripted = world.get::<SceneEntity>(entity).is_some();
+    if is_scripted {
+        let about = "Its keys and working hours do not apply while it is in your hand";
+        if ui.checkbox(&mut by_hand, "by hand").on_hover_text(about).changed() {
+            set_by_hand(world, entity, by_hand);
+        }
+    }
+    ui.add_enabled_ui(by_hand || !is_scripted, |ui| {
+        ui.checkbox(&mut emitter.enabled, "on");
+    });
+    number(
+        ui,
+        "particles/s",
+        &mut emitter.rate,
+        (0.0, 100_000.0),
+        "Each stands for more, the fewer there are",
+    );
+    match &mut emitter.flow {
+        Flow::Effect => {}
+        Flow::MmPerHour(rate) => number(ui, "rain, mm/h", rate, (0.0, 300.0), "On level ground below it"),
+        Flow::LitresPerMinute(litres) => number(ui, "flow, l/min", litres, (0.0, 200.0), ""),
+    }
+    let mut spread_deg = emitter.spread.to_degrees();
+    number(ui, "spread, degrees", &mut spread_deg, (0.0, 90.0), "Half-angle of the cone of directions");
+    if spread_deg != before.spread.to_degrees() {
+        emitter.spread = spread_deg.to_radians();
+    }
+    let about = "At the start; under a sky 0 is as fast as its drops fall";
+    number(ui, "speed, m/s", &mut emitter.speed, (0.0, 60.0), about);
+    shape(ui, &mut emitter.shape);
+    egui::ComboBox::from_label("effect").selected_text("exchange").show_ui(ui, |ui| {
+        for name in effects::names() {
+            if ui.selectable_label(false, name).clicked()
+                && let Some(effect) = effects::shipped(world, name)
+            {
+                emitter.effect = effect;
+            }
+        }
+    });
+    if let Some(state) = world.get::<EmitterState>(entity) {
+        ui.small(format!("{} sent so far", state.emitted));
+    }
+    if is_changed(&before, &emitter)
+        && let Some(mut there) = world.get_mut::<Emitter>(entity)
+    {
+        *there = emitter;
+    }
+}
+
+fn set_by_hand(world: &mut World, entity: Entity, by_hand: bool) {
+    let mut entity = world.entity_mut(entity);
+    if by_hand {
+        entity.insert(ByHand);
+    } else {
+        entity.remove::<ByHand>();
+    }
+}
+
+fn is_changed(one: &Emitter, other: &Emitter) -> bool {
+    let numbers = |emitter: &Emitter| [emitter.rate, emitter.speed, emitter.spread, emitter.lifetime];
+    numbers(one) != numbers(other)
+        || one.flow != other.flow
+        || one.shape != other.shape
+        || one.effect != other.effect
+        || one.enabled != other.enabled
+}
+
+/// The measures of where particles start.
+fn shape(ui: &mut egui::Ui, shape: &mut EmitterShape) {
+    match shape {
+        EmitterShape::Point => {}
+        EmitterShape::Cone { radius } => number(ui, "nozzle radius, m", radius, (0.001, 0.5), ""),
+        EmitterShape::Disc { radius } => number(ui, "radius, m", radius, (0.001, 20.0), ""),
+        EmitterShape::Box { half_size } => {
+            for (label, value) in ["half x, m", "half y, m", "half z, m"].into_iter().zip([
+                &mut half_size.x,
+                &mut half_size.y,
+                &mut half_size.z,
+            ]) {
+                number(ui, label, value, (0.0, 20.0), "");
+            }
+        }
+        EmitterShape::Sky { half_size } => {
+            number(ui, "half x, m", &mut half_size.x, (0.01, 100.0), "Along x");
+            number(ui, "half z, m", &mut half_size.y, (0.01, 100.0), "Along z");
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! Tools in the hand, and the hose: while the left button is held, an emitter at the camera points at the cursor.
+
+use bevy::prelude::*;
+use bevy::window::PrimaryWindow;
+use bevy_egui::egui;
+use bevy_weathering::emitter::Emitter;
+
+use super::camera::View;
+use super::effects;
+use super::settings::{HoseSettings, Settings, Tool};
+use super::ui::{AddPanel, Place, UiInput};
+use super::widgets::number;
+
+/// Number of its random stream: behind those of any scenario.
+const STREAM: u32 = u32::MAX;
+
+/// The emitter in the hand. Spawned with the first press after it has gone, so that a scene without it is as it was loaded.
+#[derive(Component)]
+pub struct InHand;
+
+/// The left button is held in the scene, and the ray below the cursor.
+#[derive(Resource, Default)]
+pub struct Pointed {
+    /// It was pressed in the scene, and is held.
+    pub held: bool,
+    /// It was pressed in this frame.
+    pub pressed: bool,
+    /// From the eye.
+    pub ray: Option<Ray3d>,
+}
+
+pub fn plugin(app: &mut App) {
+    app.init_resource::<Pointed>()
+        .add_systems(PreUpdate, point.after(bevy::input::InputSystems))
+        .add_systems(Update, spray)
+        .add_panel(Place::Bar, "tools", show_tools)
+        .add_panel(Place::Side, "Hose", show);
+}
+
+fn point(
+    buttons: Res<ButtonInput<MouseButton>>,
+    input: Res<UiInput>,
+    window: Query<&Window, With<PrimaryWindow>>,
+    cameras: Query<(&Camera, &GlobalTransform), With<View>>,
+    mut pointed: ResMut<Pointed>,
+) {
+    pointed.pressed = buttons.just_pressed(MouseButton::Left) && !input.pointer;
+    pointed.held = buttons.pressed(MouseButton::Left) && (pointed.held || pointed.pressed);
+    let cursor = window.single().ok().and_then(Window::cursor_position);
+    pointed.ray = cursor.zip(cameras.iter().next()).and_then(|(cursor, (camera, transform))| {
+        // The part of the window that is another camera's is not pointed at.
+        if !camera.logical_viewport_rect().is_some_and(|rect| rect.contains(cursor)) {
+            return None;
+        }
+        // The eye and not the near plane: what is close is hit, too.
+        let ray = camera.viewport_to_world(transform, cursor).ok()?;
+        Some(Ray3d { origin: transform.translation(), direction: ray.direction })
+    });
+}
+
+/// Opens and closes the hose.
+fn spray(
+    pointed: Res<Pointed>,
+    settings: Res<Settings>,
+    mut commands: Commands,
+    mut hoses: Query<(&mut Emitter, &mut Transform, &mut GlobalTransform), With<InHand>>,
+) {
+    let is_open = pointed.held && settings.tool == Tool::Hose;
+    let aim = pointed.ray.filter(|_| is_open).map(aimed);
+    let Ok((mut emitter, mut transform, mut global)) = hoses.single_mut() else {
+        if let Some(aim) = aim {
+            commands.queue(move |world: &mut World| take(world, aim));
+        }
+        return;
+    };
+    if emitter.enabled != is_open {
+        emitter.enabled = is_open;
+    }
+    if let Some(aim) = aim {
+        *transform = aim;
+        // Ticks come before transforms are propagated.
+        *global = GlobalTransform::from(aim);
+    }
+}
+
+/// At the right hand, below the eye, pointing at what is below the cursor some metres away.
+fn aimed(ray: Ray3d) -> Transform {
+    let eye = Transform::from_translation(ray.origin).looking_to(ray.direction, Vec3::Y);
+    let hand = ray.origin + eye.right() * 0.12 - eye.up() * 0.1;
+    eye.with_translation(hand).looking_at(ray.origin + ray.direction * 4.0, Vec3::Y)
+}
+
+/// A hose as the settings have it.
+fn take(world: &mut World, aim: Transform) {
+    let settings = world.resource::<Settings>().hose.clone();
+    let Some(effect) = effects::shipped(world, &settings.effect) else { return };
+    let mut emitter = Emitter { stream: STREAM, lifetime: 6.0, ..default() };
+    set(&mut emitter, &settings);
+    emitter.effect = effect;
+    world.spawn((Name::new("hose in the hand"), InHand, emitter, aim, GlobalTransform::from(aim)));
+}
+
+/// Makes an emitter the hose of these settings, but for its effect.
+fn set(emitter: &mut Emitter, settings: &HoseSettings) {
+    let effect = emitter.effect.clone();
+    let hose = Emitter::hose(effect, settings.litres_per_minute, settings.nozzle_mm * 1e-3);
+    *emitter = Emitter {
+        rate: settings.rate,
+        spread: settings.spread_deg.to_radians(),
+        stream: emitter.stream,
+        lifetime: emitter.lifetime,
+        enabled: emitter.enabled,
+        ..hose
+    };
+}
+
+fn show_tools(ui: &mut egui::Ui, world: &mut World) {
+    let mut settings = world.resource_mut::<Settings>();
+    ui.selectable_value(&mut settings.tool, Tool::Hose, "Hose").on_hover_text("Left button: spray (H)");
+    ui.selectable_value(&mut settings.tool, Tool::Probe, "Probe")
+        .on_hover_text("Left button: how wet it is (I)");
+    let fly = if settings.flies { "Fly" } else { "Orbit" };
+    if ui.button(fly).on_hover_text("What the right button does to the camera (C)").clicked() {
+        settings.flies = !settings.flies;
+    }
+}
+
+fn show(ui: &mut egui::Ui, world: &mut World) {
+    let before = world.resource::<Settings>().hose.clone();
+    let mut hose = before.clone();
+    ui.label("Hold the left button in the scene.");
+    egui::ComboBox::from_label("sprays").selected_text(hose.effect.as_str()).show_ui(ui, |ui| {
+        for name in effects::names() {
+            ui.selectable_value(&mut hose.effect, name.to_owned(), name);
+        }
+    });
+    let [flow, nozzle, spread, rate] = HoseSettings::RANGES;
+    number(ui, "flow, l/min", &mut hose.litres_per_minute, flow, "A garden hose has 15");
+    number(ui, "nozzle, mm", &mut hose.nozzle_mm, nozzle, "Its diameter");
+    number(ui, "spread, degrees", &mut hose.spread_deg, spread, "Half-angle at the rim");
+    number(ui, "particles/s", &mut hose.rate, rate, "Each a slug of water; the fewer, the larger");
+    let speed = bevy_weathering::emitter::nozzle_speed(hose.litres_per_minute, hose.nozzle_mm * 0.5e-3);
+    ui.label(format!("leaves the nozzle at {speed:.1} m/s"));
+    if hose == before {
+        return;
+    }
+    let effect = effects::shipped(world, &hose.effect);
+    let mut hoses = world.query_filtered::<&mut Emitter, With<InHand>>();
+    for mut emitter in hoses.iter_mut(world) {
+        set(&mut emitter, &hose);
+        if let Some(effect) = &effect {
+            emitter.effect = effect.clone();
+        }
+    }
+    world.resource_mut::<Settings>().hose = hose;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hose_points_at_what_is_below_the_cursor() {
+        for direction in [Vec3::new(0.3, -0.2, -1.0), Vec3::NEG_Y, Vec3::Y] {
+            let ray = Ray3d { origin: Vec3::new(1.0, 2.0, 3.0), direction: Dir3::new(direction).unwrap() };
+            let aim = aimed(ray);
+            assert!(aim.is_finite() && (aim.translation - ray.origin).length() < 0.2, "{direction}");
+            let target = ray.origin + ray.direction * 4.0;
+            let along = (target - aim.translation).normalize();
+            assert!(aim.forward().dot(along) > 0.9999, "{direction}");
+        }
+    }
+
+    #[test]
+    fn settings_change_the_hose_and_not_whose_it_is() {
+        let mut emitter = Emitter { stream: 7, enabled: false, lifetime: 6.0, ..default() };
+        let settings = HoseSettings { litres_per_minute: 15.0, nozzle_mm: 6.0, rate: 50.0, ..default() };
+        set(&mut emitter, &settings);
+        assert_eq!((emitter.stream, emitter.enabled, emitter.lifetime, emitter.rate), (7, false, 6.0, 50.0));
+        assert!((emitter.speed - 8.84).abs() < 0.01, "{}", emitter.speed);
+    }
+}

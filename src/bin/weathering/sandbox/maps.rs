@@ -1,0 +1,217 @@
+//! The maps of the selected surface: what is painted on it, as it is on the GPU, and what it holds, read anew every half second.
+
+use std::time::Instant;
+
+use bevy::prelude::*;
+use bevy_egui::{EguiTextureHandle, EguiUserTextures, egui};
+use bevy_weathering::matter::SurfaceMatter;
+use bevy_weathering::overlay::Overlays;
+use bevy_weathering::wetting::{SurfaceWater, WetGeometry, Wetness, WetnessQuery};
+
+use super::selection::{Selected, choose_surface};
+use super::settings::Settings;
+use super::ui::{AddPanel, Place};
+
+/// Samples along each side.
+const SIDE: usize = 128;
+/// Seconds between two readings.
+const EVERY: f32 = 0.5;
+
+/// What is shown of a surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Channel {
+    Wetness,
+    Film,
+    Absorbed,
+    Saturation,
+    Dust,
+    Mud,
+    Snow,
+    Colour,
+    Gloss,
+    Normal,
+}
+
+impl Channel {
+    const ALL: [(Self, &'static str); 10] = [
+        (Self::Wetness, "looks wet"),
+        (Self::Film, "film"),
+        (Self::Absorbed, "absorbed"),
+        (Self::Saturation, "pores full"),
+        (Self::Dust, "dust"),
+        (Self::Mud, "mud"),
+        (Self::Snow, "snow"),
+        (Self::Colour, "colour"),
+        (Self::Gloss, "gloss"),
+        (Self::Normal, "normal"),
+    ];
+
+    /// The image on the GPU, for those that are painted.
+    fn image(self, overlays: &Overlays) -> Option<&Handle<Image>> {
+        match self {
+            Self::Colour => Some(&overlays.diffuse),
+            Self::Gloss => Some(&overlays.specular),
+            Self::Normal => Some(&overlays.normal),
+            _ => None,
+        }
+    }
+
+    /// Whether it is a part of a whole, and not mm.
+    fn is_part(self) -> bool {
+        matches!(self, Self::Wetness | Self::Saturation)
+    }
+
+    fn of_water(self, wetness: &Wetness) -> f32 {
+        match self {
+            Self::Film => wetness.film_mm,
+            Self::Absorbed => wetness.absorbed_mm,
+            Self::Saturation => wetness.saturation,
+            _ => wetness.wetness,
+        }
+    }
+}
+
+/// What is shown, and what of it has been read.
+#[derive(Resource)]
+struct MapView {
+    channel: Channel,
+    /// Row by row from v = 0; empty until it has been read.
+    values: Vec<f32>,
+    /// Of what, and when.
+    read: Option<(Entity, Channel, Instant)>,
+    is_new: bool,
+    texture: Option<egui::TextureHandle>,
+}
+
+impl Default for MapView {
+    fn default() -> Self {
+        Self { channel: Channel::Wetness, values: Vec::new(), read: None, is_new: false, texture: None }
+    }
+}
+
+pub fn plugin(app: &mut App) {
+    app.init_resource::<MapView>().add_systems(Update, sample).add_panel(Place::Maps, "maps", show);
+}
+
+fn sample(
+    settings: Res<Settings>,
+    selected: Res<Selected>,
+    wetness: WetnessQuery,
+    surfaces: Query<(&SurfaceWater, &WetGeometry, Option<&SurfaceMatter>)>,
+    mut view: ResMut<MapView>,
+) {
+    let Some(surface) = selected.0.filter(|_| settings.maps && settings.panels) else { return };
+    let channel = view.channel;
+    let is_fresh = view.read.is_some_and(|(of, what, when)| {
+        (of, what) == (surface, channel) && when.elapsed().as_secs_f32() < EVERY
+    });
+    if is_fresh || matches!(channel, Channel::Colour | Channel::Gloss | Channel::Normal) {
+        return;
+    }
+    let Ok((water, geometry, matter)) = surfaces.get(surface) else { return };
+    let of_matter = |uv: Vec2| {
+        let (matter, size) = (matter?, water.size());
+        let [x, y] = [uv.x, uv.y].map(|along| ((along * size as f32) as u32).min(size.saturating_sub(1)));
+        let texel = y * size + x;
+        let held = matter.texels().get(texel as usize)?;
+        let units = match channel {
+            Channel::Dust => held.dust,
+            Channel::Mud => held.mud,
+            _ => held.snow,
+        };
+        // A geometry of another size is on its way out.
+        let is_measured = geometry.0.size() == size;
+        is_measured.then(|| (f64::from(units) * geometry.0.unit_mm(water.units(), texel)) as f32)
+    };
+    let middle = |index: usize| (index as f32 + 0.5) / SIDE as f32;
+    let value = |index: usize| {
+        let uv = Vec2::new(middle(index % SIDE), middle(index / SIDE));
+        match channel {
+            Channel::Dust | Channel::Mud | Channel::Snow => of_matter(uv).unwrap_or(0.0),
+            _ => wetness.at_uv(surface, uv).map_or(0.0, |wetness| channel.of_water(&wetness)),
+        }
+    };
+    view.values.clear();
+    view.values.extend((0..SIDE * SIDE).map(value));
+    view.read = Some((surface, channel, Instant::now()));
+    view.is_new = true;
+}
+
+/// What the brightest colour stands for.
+fn most(values: &[f32], channel: Channel) -> f32 {
+    if channel.is_part() { 1.0 } else { values.iter().copied().fold(1e-3, f32::max) }
+}
+
+/// From black over blue to white.
+fn colour(part: f32) -> egui::Color32 {
+    let byte = |from: f32, to: f32| (((part - from) / (to - from)).clamp(0.0, 1.0) * 255.0) as u8;
+    egui::Color32::from_rgb(byte(0.6, 1.0), byte(0.25, 0.9), byte(0.0, 0.6))
+}
+
+fn show(ui: &mut egui::Ui, world: &mut World) {
+    ui.separator();
+    ui.heading("Maps");
+    choose_surface(ui, world);
+    let Some(surface) = world.resource::<Selected>().0 else { return };
+    let mut channel = world.resource::<MapView>().channel;
+    ui.horizontal_wrapped(|ui| {
+        for (other, name) in Channel::ALL {
+            ui.selectable_value(&mut channel, other, name);
+        }
+    });
+    world.resource_mut::<MapView>().channel = channel;
+    let side = ui.available_width().clamp(64.0, 512.0);
+    let size = egui::Vec2::splat(side);
+    let Some(overlays) = world.get::<Overlays>(surface) else { return };
+    if let Some(image) = channel.image(overlays).cloned() {
+        ui.small(format!("{0} x {0} texels, premultiplied", overlays.size));
+        // Does not keep the map of a surface that has gone.
+        let handle = EguiTextureHandle::Weak(image.id());
+        let texture = world.resource_mut::<EguiUserTextures>().add_image(handle);
+        ui.add(egui::Image::new((texture, size)).bg_fill(egui::Color32::BLACK));
+        return;
+    }
+    let mut view = world.resource_mut::<MapView>();
+    if !view.read.is_some_and(|(of, what, _)| (of, what) == (surface, channel)) {
+        ui.spinner();
+        return;
+    }
+    let most = most(&view.values, channel);
+    if view.is_new || view.texture.is_none() {
+        view.is_new = false;
+        let pixels = view.values.iter().map(|value| colour(value / most)).collect();
+        let image = egui::ColorImage::new([SIDE, SIDE], pixels);
+        let options = egui::TextureOptions::NEAREST;
+        match &mut view.texture {
+            Some(texture) => texture.set(image, options),
+            None => view.texture = Some(ui.ctx().load_texture("map", image, options)),
+        }
+    }
+    let Some(texture) = &view.texture else { return };
+    let shown = ui.add(egui::Image::new((texture.id(), size)).sense(egui::Sense::hover()));
+    let unit = if channel.is_part() { "" } else { " mm" };
+    ui.small(format!("white is {most:.3}{unit}"));
+    if let Some(at) = shown.hover_pos() {
+        let part = (at - shown.rect.min) / shown.rect.size();
+        let [x, y] = [part.x, part.y].map(|part| ((part * SIDE as f32) as usize).min(SIDE - 1));
+        if let Some(value) = view.values.get(y * SIDE + x) {
+            ui.label(format!("uv {:.3} {:.3}: {value:.4}{unit}", part.x, part.y));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_is_brighter_and_nothing_is_black() {
+        let sum = |part| colour(part).to_array()[..3].iter().map(|&byte| u32::from(byte)).sum::<u32>();
+        assert_eq!((sum(0.0), sum(1.0)), (0, 3 * 255));
+        assert!((1..=10).all(|step| sum(step as f32 / 10.0) > sum((step - 1) as f32 / 10.0)));
+        assert_eq!(sum(f32::NAN), 0);
+        assert_eq!(most(&[0.0, 3.0, 2.0], Channel::Film), 3.0);
+        assert_eq!(most(&[0.0, 0.2], Channel::Wetness), 1.0);
+        assert!(most(&[], Channel::Dust) > 0.0);
+    }
+}

@@ -1,0 +1,131 @@
+//! Asking a place how wet it is, and since when.
+
+use bevy::prelude::*;
+use bevy_egui::egui;
+use bevy_weathering::clock::WeatheringClock;
+use bevy_weathering::collision::{CollisionScene, SceneHit};
+use bevy_weathering::matter::SurfaceMatter;
+use bevy_weathering::overlay::{Splat, Weatherable};
+use bevy_weathering::wetting::{SurfaceWater, WetGeometry, Wetness, WetnessQuery};
+
+use super::hose::Pointed;
+use super::selection::{Selected, name_of};
+use super::settings::{Settings, Tool};
+use super::ui::{AddPanel, Place};
+
+/// The farthest place that can be asked, metres.
+const REACH: f32 = 10_000.0;
+
+/// The place that was asked last.
+#[derive(Resource, Default)]
+pub struct Probed(pub Option<SceneHit>);
+
+/// What is there.
+#[derive(Resource, Default)]
+struct Reading(Option<Texel>);
+
+/// What a texel holds.
+struct Texel {
+    wetness: Wetness,
+    /// Column and row.
+    at: [u32; 2],
+    /// Seconds since its water was last moved.
+    since: Option<f64>,
+    /// Dust, mud and snow, mm.
+    matter_mm: [f64; 3],
+}
+
+pub fn plugin(app: &mut App) {
+    app.init_resource::<Probed>()
+        .init_resource::<Reading>()
+        .add_systems(Update, (ask, read).chain())
+        .add_panel(Place::Maps, "probe", show);
+}
+
+/// What lies below the cursor.
+pub fn hit(scene: &CollisionScene, ray: Ray3d) -> Option<SceneHit> {
+    scene.cast(ray.origin, ray.origin + ray.direction * REACH)
+}
+
+fn ask(
+    pointed: Res<Pointed>,
+    mut settings: ResMut<Settings>,
+    scene: Res<CollisionScene>,
+    mut probed: ResMut<Probed>,
+    mut selected: ResMut<Selected>,
+) {
+    if settings.tool != Tool::Probe || !pointed.held {
+        return;
+    }
+    let Some(hit) = pointed.ray.and_then(|ray| hit(&scene, ray)) else { return };
+    selected.0 = Some(hit.surface);
+    probed.0 = Some(hit);
+    // What was asked for is to be seen.
+    settings.maps = true;
+}
+
+type Asked =
+    (&'static Weatherable, &'static SurfaceWater, &'static WetGeometry, Option<&'static SurfaceMatter>);
+
+fn read(
+    clock: Res<WeatheringClock>,
+    wetness: WetnessQuery,
+    surfaces: Query<Asked>,
+    probed: Res<Probed>,
+    mut reading: ResMut<Reading>,
+) {
+    reading.0 = probed.0.and_then(|hit| {
+        let (surface, water, geometry, matter) = surfaces.get(hit.surface).ok()?;
+        let size = surface.texels();
+        let at = Splat::center_from_uv(hit.uv, size, surface.wrap()).map(|middle| (middle >> 8) as u32);
+        let texel = at[1] * size + at[0];
+        // Maps of another size are on their way.
+        if water.size() != size || geometry.0.size() != size {
+            return None;
+        }
+        let texel = geometry.0.stand_in(texel).unwrap_or(texel);
+        let tick = water.texels().get(texel as usize).map_or(0, |state| state.tick);
+        let ticks = clock.tick().saturating_sub(tick);
+        let since = (tick > 0).then(|| f64::from(ticks) / f64::from(clock.hz()));
+        let unit_mm = geometry.0.unit_mm(water.units(), texel);
+        let held = matter.and_then(|matter| matter.texels().get(texel as usize)).copied().unwrap_or_default();
+        let matter_mm = [held.dust, held.mud, held.snow].map(|units| f64::from(units) * unit_mm);
+        Some(Texel { wetness: wetness.at_uv(hit.surface, hit.uv)?, at, since, matter_mm })
+    });
+}
+
+fn show(ui: &mut egui::Ui, world: &mut World) {
+    ui.heading("Probe");
+    let Some(hit) = world.resource::<Probed>().0 else {
+        ui.label("Choose the probe (I) and click into the scene.");
+        return;
+    };
+    let name = name_of(world, hit.surface);
+    let Some(texel) = &world.resource::<Reading>().0 else {
+        ui.label("The place has gone.");
+        return;
+    };
+    egui::Grid::new("probe").num_columns(2).striped(true).show(ui, |ui| {
+        let mut row = |label: &str, value: String| {
+            ui.label(label);
+            ui.monospace(value);
+            ui.end_row();
+        };
+        let Wetness { wetness, film_mm, absorbed_mm, saturation } = texel.wetness;
+        row("surface", name);
+        row("texel", format!("{} {}", texel.at[0], texel.at[1]));
+        row("uv", format!("{:.4} {:.4}", hit.uv.x, hit.uv.y));
+        row("place, m", format!("{:.3} {:.3} {:.3}", hit.point.x, hit.point.y, hit.point.z));
+        row("looks wet", format!("{:.0} %", wetness * 100.0));
+        row("film", format!("{film_mm:.4} mm"));
+        row("absorbed", format!("{absorbed_mm:.4} mm"));
+        row("pores full", format!("{:.0} %", saturation * 100.0));
+        let since =
+            texel.since.map_or_else(|| "never wet".to_owned(), |seconds| format!("{seconds:.1} s ago"));
+        row("last moved", since);
+        let [dust, mud, snow] = texel.matter_mm;
+        row("dust", format!("{dust:.4} mm"));
+        row("mud", format!("{mud:.4} mm"));
+        row("snow, as water", format!("{snow:.4} mm"));
+    });
+}

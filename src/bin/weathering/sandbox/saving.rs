@@ -1,0 +1,234 @@
+//! Saving the scene into a folder and going on from one, with `src/save`.
+//!
+//! Colour maps live on the GPU: time is paused, they are read back, and then all is written on another thread. What has been
+//! saved here is a scenario's state and goes on in `weathering replay --resume`, too; so nothing of the sandbox's own may be in
+//! it.
+
+use std::path::{Path, PathBuf};
+
+use bevy::prelude::*;
+use bevy::render::gpu_readback::{Readback, ReadbackComplete};
+use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+use bevy_egui::egui;
+use bevy_weathering::clock::ShownTime;
+use bevy_weathering::overlay::{Overlays, SplatQueue};
+use bevy_weathering::particle::Particles;
+use bevy_weathering::replay::without_padding;
+use bevy_weathering::save::{ColorMaps, SaveError, SavedScene};
+use bevy_weathering::scenario::{LoadedScenario, ScenarioStatus, ScenarioSurface, reset_scenario};
+
+use super::hose::InHand;
+use super::open::Opened;
+use super::shots::OutFolder;
+use super::split::Split;
+use super::ui::Note;
+use super::weather::OwnRain;
+
+/// Frames between pausing and reading, in which the last splats are painted.
+const SETTLE: u32 = 4;
+
+/// The folder that is named in the panel.
+#[derive(Resource, Default)]
+struct Folder(Option<String>);
+
+/// A scene that is being saved, or gone on with.
+#[derive(Resource, Default)]
+struct Saving(Option<Step>);
+
+enum Step {
+    /// So many frames until the maps are read.
+    Settling { folder: PathBuf, frames: u32 },
+    /// Maps by surface, in the order of the scenario.
+    Reading { folder: PathBuf, maps: Vec<[Option<Vec<u8>>; 3]> },
+    /// So many frames until surfaces that were reset have their new, empty maps.
+    Clearing { folder: PathBuf, scene: Box<SavedScene>, frames: u32 },
+    /// On another thread.
+    Writing { folder: PathBuf, task: Task<Result<(), SaveError>> },
+}
+
+pub fn plugin(app: &mut App) {
+    app.init_resource::<Folder>().init_resource::<Saving>().add_systems(Update, advance);
+}
+
+/// Why the scene cannot be saved as it is.
+fn obstacle(world: &mut World) -> Option<&'static str> {
+    let opened = world.resource::<Opened>();
+    if opened.is_model {
+        return Some("A model that was opened by itself has no scenario to be saved with.");
+    }
+    let rows = opened.effects;
+    if world.contains_resource::<Split>() {
+        return Some("End the comparison first: the copy is no part of the scenario.");
+    }
+    let mut rain = world.query_filtered::<(), With<OwnRain>>();
+    if rain.iter(world).next().is_some() {
+        return Some("Switch the rain over the scene off: it is no part of the scenario.");
+    }
+    let particles = world.resource::<Particles>().effects();
+    let is_strange = particles.iter().any(|effect| usize::from(effect.0) >= rows);
+    is_strange.then_some("Wait until what the hose in the hand has sprayed has landed.")
+}
+
+/// Buttons to save and to go on.
+pub fn show(ui: &mut egui::Ui, world: &mut World) {
+    ui.heading("The scene");
+    let default = world.resource::<OutFolder>().0.join("saved").to_string_lossy().into_owned();
+    let mut folder = world.resource::<Folder>().0.clone().unwrap_or(default);
+    ui.horizontal(|ui| {
+        ui.label("folder");
+        ui.text_edit_singleline(&mut folder);
+    });
+    let path = PathBuf::from(folder.trim());
+    world.resource_mut::<Folder>().0 = Some(folder);
+    if world.resource::<Saving>().0.is_some() {
+        ui.horizontal(|ui| {
+            ui.spinner();
+            ui.label("at work");
+        });
+        return;
+    }
+    if !matches!(*world.resource::<ScenarioStatus>(), ScenarioStatus::Ready) {
+        return;
+    }
+    match obstacle(world) {
+        Some(why) => {
+            ui.label(why);
+        }
+        None => {
+            if ui.button("Save").on_hover_text("Replaces what was saved there").clicked() {
+                begin(world, &path);
+            }
+        }
+    }
+    let is_alone = !world.resource::<Opened>().is_model && !world.contains_resource::<Split>();
+    let is_saved = is_alone && path.join("state.ron").is_file();
+    if is_saved
+        && ui.button("Go on from there").on_hover_text("Of the same scenario only").clicked()
+        && let Err(error) = begin_restoring(world, &path)
+    {
+        world.resource_mut::<Note>().complain(error.to_string());
+    }
+}
+
+/// What of the sandbox's own is not to be saved, nor in the way of what was.
+fn put_tools_away(world: &mut World) {
+    let mut hoses = world.query_filtered::<Entity, With<InHand>>();
+    for hose in hoses.iter(world).collect::<Vec<_>>() {
+        world.despawn(hose);
+    }
+}
+
+fn begin(world: &mut World, folder: &Path) {
+    if let Err(error) = SavedScene::check_folder(folder) {
+        world.resource_mut::<Note>().complain(error.to_string());
+        return;
+    }
+    put_tools_away(world);
+    world.resource_mut::<Time<Virtual>>().pause();
+    world.resource_mut::<Saving>().0 = Some(Step::Settling { folder: folder.into(), frames: SETTLE });
+}
+
+/// Reads a scene, and takes this one back to its beginning.
+fn begin_restoring(world: &mut World, folder: &Path) -> Result<(), SaveError> {
+    let scene = Box::new(SavedScene::read(folder)?);
+    put_tools_away(world);
+    world.resource_mut::<Time<Virtual>>().pause();
+    reset_scenario(world);
+    world.insert_resource(ShownTime::Now);
+    world.resource_mut::<Saving>().0 = Some(Step::Clearing { folder: folder.into(), scene, frames: SETTLE });
+    Ok(())
+}
+
+fn restore(world: &mut World, folder: &Path, scene: &SavedScene) {
+    let scenario = world.resource::<Opened>().loaded.clone();
+    let restored = scene.restore(world, &scenario, folder);
+    let mut note = world.resource_mut::<Note>();
+    match restored {
+        Ok(()) => note.tell(format!("went on from {}, paused", folder.display())),
+        Err(error) => note.complain(error.to_string()),
+    }
+}
+
+/// Surfaces with maps, in the order of the scenario.
+fn surfaces(world: &mut World) -> Vec<Overlays> {
+    let mut query = world.query::<(&ScenarioSurface, &Overlays)>();
+    let mut all: Vec<(u32, Overlays)> =
+        query.iter(world).map(|(surface, overlays)| (surface.index, overlays.clone())).collect();
+    all.sort_by_key(|(index, _)| *index);
+    all.into_iter().map(|(_, overlays)| overlays).collect()
+}
+
+/// Asks for the three colour maps of each surface.
+fn ask(world: &mut World) -> Vec<[Option<Vec<u8>>; 3]> {
+    let surfaces = surfaces(world);
+    for (index, Overlays { size, diffuse, specular, normal, .. }) in surfaces.iter().enumerate() {
+        let size = *size;
+        for (map, image) in [diffuse, specular, normal].into_iter().enumerate() {
+            world.spawn(Readback::texture(image.clone())).observe(
+                move |data: On<ReadbackComplete>, mut saving: ResMut<Saving>, mut commands: Commands| {
+                    // It would be read again every frame.
+                    commands.entity(data.entity).try_despawn();
+                    if let Some(Step::Reading { maps, .. }) = &mut saving.0
+                        && let Some(map) = maps.get_mut(index).map(|maps| &mut maps[map])
+                    {
+                        map.get_or_insert_with(|| without_padding(&data.data, size));
+                    }
+                },
+            );
+        }
+    }
+    vec![[const { None }; 3]; surfaces.len()]
+}
+
+fn advance(world: &mut World) {
+    let Some(step) = world.resource_mut::<Saving>().0.take() else { return };
+    let next = match step {
+        Step::Settling { folder, frames: 0 } => {
+            let maps = ask(world);
+            Some(Step::Reading { folder, maps })
+        }
+        Step::Settling { folder, frames } => {
+            let mut queues = world.query::<&SplatQueue>();
+            let waits = queues.iter(world).any(|queue| !queue.is_empty());
+            Some(Step::Settling { folder, frames: if waits { SETTLE } else { frames - 1 } })
+        }
+        Step::Reading { folder, maps } if maps.iter().flatten().all(Option::is_some) => {
+            Some(write(world, folder, maps))
+        }
+        Step::Reading { folder, maps } => Some(Step::Reading { folder, maps }),
+        Step::Clearing { folder, scene, frames: 0 } => {
+            restore(world, &folder, &scene);
+            None
+        }
+        Step::Clearing { folder, scene, frames } => {
+            Some(Step::Clearing { folder, scene, frames: frames - 1 })
+        }
+        Step::Writing { folder, mut task } => match check_ready(&mut task) {
+            None => Some(Step::Writing { folder, task }),
+            Some(written) => {
+                let mut note = world.resource_mut::<Note>();
+                match written {
+                    Ok(()) => note.tell(format!("saved {}", folder.display())),
+                    Err(error) => note.complain(error.to_string()),
+                }
+                None
+            }
+        },
+    };
+    world.resource_mut::<Saving>().0 = next;
+}
+
+/// Takes the state and has it written.
+fn write(world: &mut World, folder: PathBuf, maps: Vec<[Option<Vec<u8>>; 3]>) -> Step {
+    let colors = maps.into_iter().map(|[diffuse, specular, normal]| ColorMaps {
+        diffuse: diffuse.unwrap_or_default(),
+        specular: specular.unwrap_or_default(),
+        normal: normal.unwrap_or_default(),
+    });
+    let colors = colors.collect();
+    let scenario: LoadedScenario = world.resource::<Opened>().loaded.clone();
+    let scene = SavedScene::capture(world, &scenario, colors);
+    let to = folder.clone();
+    let task = AsyncComputeTaskPool::get().spawn(async move { scene.write(&to) });
+    Step::Writing { folder, task }
+}

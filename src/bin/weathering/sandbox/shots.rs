@@ -1,0 +1,142 @@
+//! Pictures of the scene without panels: one (F12), or one of every frame in which time has gone on (F11).
+
+use std::path::{Path, PathBuf};
+
+use bevy::prelude::*;
+use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
+use bevy_egui::egui;
+use bevy_weathering::clock::WeatheringClock;
+use bevy_weathering::replay::write_png;
+
+use super::ui::{AddPanel, Note, Place, UiCamera, keyboard_is_free};
+
+/// Where pictures and saved scenes go.
+#[derive(Resource)]
+pub struct OutFolder(pub PathBuf);
+
+/// A sequence that is being taken.
+#[derive(Resource, Default)]
+struct Sequence {
+    folder: Option<PathBuf>,
+    frames: u32,
+    /// Tick of the last picture.
+    tick: u32,
+}
+
+/// The next frame is to be a picture, in this file.
+#[derive(Resource, Default)]
+struct Wanted(Option<PathBuf>);
+
+pub fn plugin(app: &mut App) {
+    app.init_resource::<Sequence>()
+        .init_resource::<Wanted>()
+        .add_systems(Update, keys.run_if(keyboard_is_free))
+        .add_systems(PostUpdate, (follow_sequence, take).chain())
+        .add_panel(Place::Side, "Files", show);
+}
+
+/// The first of `name_000.png`, `name_001.png`, ... (or folders of that name) that is not there yet.
+fn free_name(folder: &Path, name: &str, extension: &str) -> PathBuf {
+    let mut number = 0;
+    loop {
+        let path = folder.join(format!("{name}_{number:03}{extension}"));
+        if !path.exists() {
+            return path;
+        }
+        number += 1;
+    }
+}
+
+fn keys(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
+    if keys.just_pressed(KeyCode::F12) {
+        commands.queue(want_picture);
+    }
+    if keys.just_pressed(KeyCode::F11) {
+        commands.queue(toggle_sequence);
+    }
+}
+
+fn want_picture(world: &mut World) {
+    let path = free_name(&world.resource::<OutFolder>().0, "screenshot", ".png");
+    world.resource_mut::<Wanted>().0 = Some(path);
+}
+
+fn toggle_sequence(world: &mut World) {
+    let fresh = free_name(&world.resource::<OutFolder>().0, "sequence", "");
+    let tick = world.resource::<WeatheringClock>().tick();
+    let mut sequence = world.resource_mut::<Sequence>();
+    let told = match sequence.folder.take() {
+        Some(folder) => format!("{} pictures in {}", sequence.frames, folder.display()),
+        None => {
+            let told = format!("taking pictures into {}", fresh.display());
+            *sequence = Sequence { folder: Some(fresh), frames: 0, tick };
+            told
+        }
+    };
+    world.resource_mut::<Note>().tell(told);
+}
+
+/// A picture of every frame in which time has gone on.
+fn follow_sequence(clock: Res<WeatheringClock>, mut sequence: ResMut<Sequence>, mut wanted: ResMut<Wanted>) {
+    let Some(folder) = &sequence.folder else { return };
+    if clock.tick() == sequence.tick || wanted.0.is_some() {
+        return;
+    }
+    let path = folder.join(format!("frame_{:05}.png", sequence.frames));
+    wanted.0 = Some(path);
+    sequence.frames += 1;
+    sequence.tick = clock.tick();
+}
+
+/// Takes the frame that is about to be drawn, without panels.
+fn take(mut wanted: ResMut<Wanted>, mut commands: Commands, mut panels: Query<&mut Camera, With<UiCamera>>) {
+    let path = wanted.0.take();
+    for mut camera in &mut panels {
+        let is_shown = path.is_none();
+        if camera.is_active != is_shown {
+            camera.is_active = is_shown;
+        }
+    }
+    let Some(path) = path else { return };
+    commands.spawn(Screenshot::primary_window()).observe(
+        move |captured: On<ScreenshotCaptured>, mut note: ResMut<Note>| match write_png(
+            &path,
+            captured.image.clone(),
+        ) {
+            Ok(()) => note.tell(format!("saved {}", path.display())),
+            Err(error) => note.complain(error.to_string()),
+        },
+    );
+}
+
+fn show(ui: &mut egui::Ui, world: &mut World) {
+    ui.heading("Pictures");
+    ui.horizontal(|ui| {
+        if ui.button("Take one").on_hover_text("Without panels (F12)").clicked() {
+            want_picture(world);
+        }
+        let is_running = world.resource::<Sequence>().folder.is_some();
+        let label = if is_running { "End the sequence" } else { "Begin a sequence" };
+        if ui.button(label).on_hover_text("Of every frame in which time goes on (F11)").clicked() {
+            toggle_sequence(world);
+        }
+    });
+    ui.small(format!("into {}", world.resource::<OutFolder>().0.display()));
+    ui.separator();
+    super::saving::show(ui, world);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = free_name(folder.path(), "shot", ".png");
+        assert_eq!(first, folder.path().join("shot_000.png"));
+        std::fs::write(&first, "x").unwrap();
+        assert_eq!(free_name(folder.path(), "shot", ".png"), folder.path().join("shot_001.png"));
+        assert_eq!(free_name(&folder.path().join("none"), "shot", ""), folder.path().join("none/shot_000"));
+    }
+}

@@ -1,0 +1,307 @@
+//! Two settings side by side: a copy of the scene, some way off, whose surfaces may be of other materials.
+//!
+//! A second camera looks at the copy from where the first one looks at the scene, and shows it on the right of a divider. What
+//! falls on the scene falls on the copy, too: each emitter has one there, which follows it but draws lots of its own. Render
+//! layers keep the two from seeing each other's surfaces.
+//!
+//! Surfaces that are posed are not copied.
+
+use bevy::camera::visibility::RenderLayers;
+use bevy::camera::{Exposure, Viewport};
+use bevy::light::{EnvironmentMapLight, Skybox};
+use bevy::prelude::*;
+use bevy::window::PrimaryWindow;
+use bevy_egui::egui;
+use bevy_weathering::collision::{CollisionScene, DeformingCollider};
+use bevy_weathering::emitter::Emitter;
+use bevy_weathering::material::{DryMaterial, PorousMaterial, StandingWater, WettingTextures};
+use bevy_weathering::overlay::Weatherable;
+use bevy_weathering::particle::ParticleMesh;
+use bevy_weathering::scenario::SceneEntity;
+
+use super::camera::View;
+use super::theme;
+use super::ui::{AddPanel, Place};
+
+/// What both cameras see is in both of these layers.
+const LAYERS: [usize; 2] = [0, 1];
+/// Added to the streams of emitters.
+const STREAMS: u32 = 1 << 30;
+/// Where the divider may be, in parts of the window's width.
+const DIVIDER: (f32, f32) = (0.1, 0.9);
+
+/// The comparison, while there is one.
+#[derive(Resource)]
+pub struct Split {
+    /// From the scene to its copy, metres.
+    pub offset: Vec3,
+    /// Bounds of the scene without its copy.
+    bounds: (Vec3, Vec3),
+    /// Of the divider, in parts of the window's width.
+    at: f32,
+}
+
+/// What stands for another entity in the copy.
+#[derive(Component)]
+pub struct CopyOf(Entity);
+
+/// The camera that looks at the copy.
+#[derive(Component)]
+pub struct SecondCamera;
+
+pub fn plugin(app: &mut App) {
+    app.add_systems(PreUpdate, follow_emitters.run_if(resource_exists::<Split>))
+        .add_systems(
+            PostUpdate,
+            (divide, follow_camera).run_if(resource_exists::<Split>).before(TransformSystems::Propagate),
+        )
+        .add_panel(Place::Side, "Compare", show);
+}
+
+/// Smallest and largest corner of the scene, without its copy.
+pub fn bounds(split: Option<&Split>, scene: &CollisionScene) -> (Vec3, Vec3) {
+    split.map_or_else(|| scene.bounds(), |split| split.bounds)
+}
+
+/// How far off the copy is: out of the scene's way, but no farther, for the sake of what is measured in a grid over all of it.
+fn offset((low, high): (Vec3, Vec3)) -> Vec3 {
+    let size = high - low;
+    Vec3::X * (2.0 * size.max_element().clamp(1.0, 1000.0) + 5.0)
+}
+
+fn begin(world: &mut World) {
+    let scene = world.resource::<CollisionScene>();
+    if scene.is_empty() || world.contains_resource::<Split>() {
+        return;
+    }
+    let bounds = scene.bounds();
+    let offset = offset(bounds);
+    copy_surfaces(world, offset);
+    let both = RenderLayers::from_layers(&LAYERS);
+    let mut shared = world.query_filtered::<Entity, Or<(With<DirectionalLight>, With<ParticleMesh>)>>();
+    for entity in shared.iter(world).collect::<Vec<_>>() {
+        world.entity_mut(entity).insert(both.clone());
+    }
+    add_camera(world);
+    world.insert_resource(Split { offset, bounds, at: 0.5 });
+}
+
+/// Takes the copy away. Also before another scene comes.
+pub fn end(world: &mut World) {
+    if world.remove_resource::<Split>().is_none() {
+        return;
+    }
+    let mut copies = world.query_filtered::<Entity, Or<(With<CopyOf>, With<SecondCamera>)>>();
+    for copy in copies.iter(world).collect::<Vec<_>>() {
+        world.despawn(copy);
+    }
+    let mut cameras = world.query_filtered::<&mut Camera, With<View>>();
+    for mut camera in cameras.iter_mut(world) {
+        camera.viewport = None;
+    }
+}
+
+fn copy_surfaces(world: &mut World, offset: Vec3) {
+    let mut surfaces =
+        world.query_filtered::<Entity, (With<Weatherable>, Without<CopyOf>, Without<DeformingCollider>)>();
+    for original in surfaces.iter(world).collect::<Vec<_>>() {
+        let of = world.entity(original);
+        let (Some(surface), Some(mesh), Some(place)) =
+            (of.get::<Weatherable>(), of.get::<Mesh3d>(), of.get::<GlobalTransform>())
+        else {
+            continue;
+        };
+        // As it was before it was exchanged for its weathered form.
+        let dry = of.get::<DryMaterial>().map(|dry| dry.0.clone());
+        let dry = dry.or_else(|| of.get::<MeshMaterial3d<StandardMaterial>>().map(|own| own.0.clone()));
+        let Some(dry) = dry else { continue };
+        let mut transform = place.compute_transform();
+        transform.translation += offset;
+        let name = of.get::<Name>().map_or_else(|| original.to_string(), ToString::to_string);
+        let copy = (
+            CopyOf(original),
+            SceneEntity,
+            Name::new(format!("B: {name}")),
+            *surface,
+            mesh.clone(),
+            MeshMaterial3d(dry),
+            of.get::<PorousMaterial>().copied().unwrap_or_default(),
+            of.get::<StandingWater>().copied().unwrap_or_default(),
+            of.get::<WettingTextures>().cloned().unwrap_or_default(),
+            transform,
+            GlobalTransform::from(transform),
+            RenderLayers::layer(LAYERS[1]),
+        );
+        world.spawn(copy);
+    }
+}
+
+/// A camera like the scene's.
+fn add_camera(world: &mut World) {
+    let mut cameras = world.query_filtered::<Entity, With<View>>();
+    let Some(first) = cameras.iter(world).next() else { return };
+    let of = world.entity(first);
+    let projection = of.get::<Projection>().cloned().unwrap_or_default();
+    let msaa = of.get::<Msaa>().copied().unwrap_or_default();
+    let exposure = of.get::<Exposure>().copied().unwrap_or_default();
+    let (light, sky) = (of.get::<EnvironmentMapLight>().cloned(), of.get::<Skybox>().cloned());
+    let camera = Camera { order: 1, ..default() };
+    let layers = RenderLayers::layer(LAYERS[1]);
+    let mut second = world.spawn((
+        SecondCamera,
+        SceneEntity,
+        Name::new("second camera"),
+        Camera3d::default(),
+        camera,
+        projection,
+        msaa,
+        exposure,
+        layers,
+        Transform::default(),
+    ));
+    if let Some(light) = light {
+        second.insert(light);
+    }
+    if let Some(sky) = sky {
+        second.insert(sky);
+    }
+}
+
+/// Emitters of the copy do what those of the scene do, and come and go with them.
+fn follow_emitters(
+    split: Res<Split>,
+    mut commands: Commands,
+    originals: Query<(Entity, &Emitter, &GlobalTransform), Without<CopyOf>>,
+    mut copies: Query<(Entity, &CopyOf, &mut Emitter, &mut Transform, &mut GlobalTransform), With<CopyOf>>,
+) {
+    for (original, emitter, global) in &originals {
+        if copies.iter().any(|(_, of, ..)| of.0 == original) {
+            continue;
+        }
+        let mut transform = global.compute_transform();
+        transform.translation += split.offset;
+        let emitter = Emitter { stream: emitter.stream.wrapping_add(STREAMS), ..emitter.clone() };
+        commands.spawn((CopyOf(original), SceneEntity, emitter, transform, GlobalTransform::from(transform)));
+    }
+    for (copy, of, mut emitter, mut transform, mut global) in &mut copies {
+        let Ok((_, original, place)) = originals.get(of.0) else {
+            commands.entity(copy).despawn();
+            continue;
+        };
+        *emitter = Emitter { stream: emitter.stream, ..original.clone() };
+        *transform = place.compute_transform();
+        transform.translation += split.offset;
+        *global = GlobalTransform::from(*transform);
+    }
+}
+
+/// Gives each camera its part of the window.
+fn divide(
+    split: Res<Split>,
+    window: Query<&Window, With<PrimaryWindow>>,
+    mut first: Query<&mut Camera, (With<View>, Without<SecondCamera>)>,
+    mut second: Query<&mut Camera, With<SecondCamera>>,
+) {
+    let Ok(window) = window.single() else { return };
+    let [left, right] = viewports(window.physical_size(), split.at);
+    for mut camera in &mut first {
+        set_viewport(&mut camera, left.clone());
+    }
+    for mut camera in &mut second {
+        set_viewport(&mut camera, right.clone());
+    }
+}
+
+fn set_viewport(camera: &mut Mut<Camera>, viewport: Viewport) {
+    let is_there = camera.viewport.as_ref().is_some_and(|there| {
+        (there.physical_position, there.physical_size) == (viewport.physical_position, viewport.physical_size)
+    });
+    if !is_there {
+        camera.viewport = Some(viewport);
+    }
+}
+
+/// Left and right of a divider; neither is empty, and together they are the window, if it is two pixels wide.
+fn viewports(size: UVec2, at: f32) -> [Viewport; 2] {
+    let size = size.max(UVec2::new(2, 1));
+    let left = ((size.x as f32 * at) as u32).clamp(1, size.x - 1);
+    let part = |x: u32, width: u32| Viewport {
+        physical_position: UVec2::new(x, 0),
+        physical_size: UVec2::new(width, size.y),
+        ..default()
+    };
+    [part(0, left), part(left, size.x - left)]
+}
+
+fn follow_camera(
+    split: Res<Split>,
+    first: Query<&Transform, (With<View>, Without<SecondCamera>)>,
+    mut second: Query<&mut Transform, With<SecondCamera>>,
+) {
+    let Some(first) = first.iter().next() else { return };
+    for mut transform in &mut second {
+        transform.set_if_neq(first.with_translation(first.translation + split.offset));
+    }
+}
+
+fn show(ui: &mut egui::Ui, world: &mut World) {
+    ui.label("A copy of the scene on the right, of other materials; the same falls on both.");
+    let is_on = world.contains_resource::<Split>();
+    if !is_on {
+        if ui.button("Begin").clicked() {
+            begin(world);
+        }
+        return;
+    }
+    if ui.button("End").clicked() {
+        end(world);
+        return;
+    }
+    ui.label("Materials of the right side: those whose surface begins with \"B\".");
+    ui.label("Tools act on the left side; the hose wets both.");
+}
+
+/// The line between the two, which can be dragged. `free`: what panels leave of the window.
+pub fn show_divider(context: &egui::Context, free: egui::Rect, world: &mut World) {
+    let Some(mut split) = world.get_resource_mut::<Split>() else { return };
+    let whole = context.viewport_rect();
+    let x = whole.left() + whole.width() * split.at;
+    let area = egui::Area::new("divider".into()).order(egui::Order::Middle).movable(false);
+    let area = area.fixed_pos(egui::pos2(x - 5.0, free.top())).constrain(false);
+    area.show(context, |ui| {
+        let size = egui::vec2(10.0, free.height());
+        let (rect, line) = ui.allocate_exact_size(size, egui::Sense::drag());
+        let color = if line.hovered() || line.dragged() { theme::ACCENT } else { egui::Color32::GRAY };
+        let line_rect = egui::Rect::from_center_size(rect.center(), egui::vec2(2.0, rect.height()));
+        ui.painter().rect_filled(line_rect, 0.0, color);
+        if line.dragged() {
+            let (least, most) = DIVIDER;
+            split.at = (split.at + line.drag_delta().x / whole.width().max(1.0)).clamp(least, most);
+        }
+        line.on_hover_cursor(egui::CursorIcon::ResizeHorizontal);
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_two_parts_are_the_window() {
+        for (size, at) in [((1280, 720), 0.5), ((1281, 720), 0.3), ((3, 1), 0.9), ((0, 0), 0.1)] {
+            let size = UVec2::from(size);
+            let [left, right] = viewports(size, at);
+            assert_eq!(left.physical_position, UVec2::ZERO);
+            assert_eq!(right.physical_position, UVec2::new(left.physical_size.x, 0));
+            assert!(left.physical_size.min_element() > 0 && right.physical_size.min_element() > 0);
+            assert_eq!(left.physical_size.x + right.physical_size.x, size.x.max(2));
+        }
+    }
+
+    #[test]
+    fn the_copy_is_out_of_the_way() {
+        for bounds in [(Vec3::ZERO, Vec3::ONE), (Vec3::splat(-40.0), Vec3::splat(60.0))] {
+            assert!(offset(bounds).x > bounds.1.x - bounds.0.x);
+        }
+    }
+}

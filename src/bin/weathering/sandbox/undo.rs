@@ -1,0 +1,159 @@
+//! Taking brush strokes back.
+//!
+//! Before a stroke first touches a surface, what it holds is kept. Taking the stroke back puts that there again, whatever has
+//! happened on the surface since. The oldest strokes are forgotten when all of them together take too much room.
+
+use std::collections::VecDeque;
+
+use bevy::prelude::*;
+use bevy_weathering::brush::BrushQueue;
+use bevy_weathering::clock::WeatheringClock;
+use bevy_weathering::matter::SurfaceMatter;
+use bevy_weathering::wetting::SurfaceWater;
+
+use super::ui::{Note, keyboard_is_free};
+
+/// Bytes of all that is kept.
+const ROOM: usize = 256 << 20;
+
+/// Things that may be taken back, the last one first, and how large they are.
+struct Stack<T> {
+    entries: VecDeque<(usize, T)>,
+    bytes: usize,
+    room: usize,
+}
+
+impl<T> Stack<T> {
+    fn new(room: usize) -> Self {
+        Self { entries: VecDeque::new(), bytes: 0, room }
+    }
+
+    /// Adds one, and forgets the oldest as far as there is no room; but never the last one.
+    fn push(&mut self, bytes: usize, entry: T) {
+        self.entries.push_back((bytes, entry));
+        self.bytes += bytes;
+        while self.bytes > self.room && self.entries.len() > 1 {
+            if let Some((bytes, _)) = self.entries.pop_front() {
+                self.bytes -= bytes;
+            }
+        }
+    }
+
+    fn pop(&mut self) -> Option<T> {
+        let (bytes, entry) = self.entries.pop_back()?;
+        self.bytes -= bytes;
+        Some(entry)
+    }
+
+    fn clear(&mut self) {
+        self.entries.clear();
+        self.bytes = 0;
+    }
+}
+
+/// A surface before a stroke.
+struct Before {
+    surface: Entity,
+    water: SurfaceWater,
+    matter: SurfaceMatter,
+}
+
+/// Strokes that may be taken back, and the one that is being painted.
+#[derive(Resource)]
+pub struct Undo {
+    strokes: Stack<Vec<Before>>,
+    current: Vec<Before>,
+}
+
+impl Default for Undo {
+    fn default() -> Self {
+        Self { strokes: Stack::new(ROOM), current: Vec::new() }
+    }
+}
+
+impl Undo {
+    /// Keeps what a surface holds, if this stroke has not touched it yet.
+    pub fn keep(&mut self, surface: Entity, water: &SurfaceWater, matter: &SurfaceMatter) {
+        if self.current.iter().all(|before| before.surface != surface) {
+            self.current.push(Before { surface, water: water.clone(), matter: matter.clone() });
+        }
+    }
+
+    /// The stroke is over.
+    pub fn end_stroke(&mut self) {
+        if !self.current.is_empty() {
+            let stroke = std::mem::take(&mut self.current);
+            let bytes = stroke.iter().map(|before| before.water.bytes() + before.matter.bytes()).sum();
+            self.strokes.push(bytes, stroke);
+        }
+    }
+
+    /// Strokes that may be taken back.
+    pub fn count(&self) -> usize {
+        self.strokes.entries.len()
+    }
+}
+
+pub fn plugin(app: &mut App) {
+    app.init_resource::<Undo>()
+        .add_systems(Update, press.run_if(keyboard_is_free))
+        // Before anything new is painted on what begins anew.
+        .add_systems(PreUpdate, forget);
+}
+
+fn press(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
+    let control = keys.any_pressed([KeyCode::ControlLeft, KeyCode::ControlRight]);
+    if control && keys.just_pressed(KeyCode::KeyZ) {
+        commands.queue(undo);
+    }
+}
+
+/// Takes the last stroke back.
+pub fn undo(world: &mut World) {
+    let mut undo = world.resource_mut::<Undo>();
+    undo.end_stroke();
+    let Some(stroke) = undo.strokes.pop() else {
+        world.resource_mut::<Note>().tell("no stroke to take back");
+        return;
+    };
+    // Its last touches may still wait for a tick.
+    world.resource_mut::<BrushQueue>().0.clear();
+    let mut surfaces = world.query::<(&mut SurfaceWater, &mut SurfaceMatter)>();
+    for Before { surface, water, matter } in &stroke {
+        if let Ok((mut there, mut beside)) = surfaces.get_mut(world, *surface) {
+            there.put_back(&mut beside, water, matter);
+        }
+    }
+    world.resource_mut::<Note>().tell("took a stroke back");
+}
+
+/// What was painted before the scene began anew is no more.
+fn forget(clock: Res<WeatheringClock>, mut undo: ResMut<Undo>, mut last: Local<u32>) {
+    if clock.tick() < *last {
+        undo.strokes.clear();
+        undo.current.clear();
+    }
+    *last = clock.tick();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_comes_back_first_and_the_oldest_are_forgotten() {
+        let mut stack = Stack::new(100);
+        for (bytes, name) in [(40, "a"), (40, "b"), (40, "c")] {
+            stack.push(bytes, name);
+        }
+        assert_eq!((stack.pop(), stack.pop(), stack.pop()), (Some("c"), Some("b"), None));
+        assert_eq!(stack.bytes, 0);
+        // However large it is, the last one can be taken back.
+        stack.push(10, "d");
+        stack.push(1000, "e");
+        assert_eq!((stack.pop(), stack.pop()), (Some("e"), None));
+        stack.push(10, "f");
+        stack.clear();
+        assert_eq!((stack.pop(), stack.bytes), (None, 0));
+    }
+}

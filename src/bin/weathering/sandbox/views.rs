@@ -1,0 +1,213 @@
+//! What is drawn over the scene: boxes of BVHs, seams of uvs, emitters, the wind, where particles are, and the probe.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use bevy::math::bounding::Aabb3d;
+use bevy::prelude::*;
+use bevy_egui::egui;
+use bevy_weathering::collision::{CollisionScene, MeshBvh, MeshTriangles, SurfaceCollider};
+use bevy_weathering::emitter::{Emitter, EmitterShape};
+use bevy_weathering::particle::Particles;
+use bevy_weathering::weather::Weather;
+
+use super::probe::Probed;
+use super::selection::Selected;
+use super::settings::{Settings, Tool};
+use super::ui::{AddPanel, Place};
+
+/// Cells of the particle count along the longest side of the scene.
+const CELLS: f32 = 14.0;
+
+/// Edges at which uvs break, of the selected surface.
+#[derive(Resource, Default)]
+struct Seams {
+    of: Option<Arc<MeshBvh>>,
+    /// In the space of the mesh.
+    edges: Vec<[Vec3; 2]>,
+}
+
+pub fn plugin(app: &mut App) {
+    app.init_resource::<Seams>()
+        .add_systems(Update, (draw_boxes, draw_seams, draw_emitters, draw_wind, draw_particles, draw_probe))
+        .add_panel(Place::Side, "Views", show);
+}
+
+fn show(ui: &mut egui::Ui, world: &mut World) {
+    let edges = world.resource::<Seams>().edges.len();
+    let mut settings = world.resource_mut::<Settings>();
+    let views = &mut settings.views;
+    ui.checkbox(&mut views.boxes, "boxes").on_hover_text("Around each surface, and around all of them");
+    ui.checkbox(&mut views.seams, "uv seams").on_hover_text("Where the uvs of the selected surface break");
+    if views.seams {
+        ui.small(format!("{edges} edges"));
+    }
+    ui.checkbox(&mut views.emitters, "emitters").on_hover_text("Where they are and which way they point");
+    ui.checkbox(&mut views.wind, "wind").on_hover_text("An arrow as long as it goes in a second");
+    ui.checkbox(&mut views.particles, "particle count").on_hover_text("From blue, few, to red, many");
+}
+
+fn draw_boxes(
+    settings: Res<Settings>,
+    scene: Res<CollisionScene>,
+    surfaces: Query<(&GlobalTransform, &SurfaceCollider)>,
+    mut gizmos: Gizmos,
+) {
+    if !settings.views.boxes || scene.is_empty() {
+        return;
+    }
+    for (transform, collider) in &surfaces {
+        let (min, max) = collider.0.bounds();
+        let bounds = Aabb3d { min: min.into(), max: max.into() };
+        gizmos.aabb_3d(bounds, *transform, Color::srgb(0.3, 0.9, 0.4));
+    }
+    let (min, max) = scene.bounds();
+    let bounds = Aabb3d { min: min.into(), max: max.into() };
+    gizmos.aabb_3d(bounds, Transform::IDENTITY, Color::srgb(0.9, 0.9, 0.3));
+}
+
+fn draw_seams(
+    settings: Res<Settings>,
+    selected: Res<Selected>,
+    surfaces: Query<(&GlobalTransform, &SurfaceCollider)>,
+    mut seams: ResMut<Seams>,
+    mut gizmos: Gizmos,
+) {
+    if !settings.views.seams {
+        return;
+    }
+    let Some((transform, collider)) = selected.0.and_then(|surface| surfaces.get(surface).ok()) else {
+        return;
+    };
+    if !seams.of.as_ref().is_some_and(|of| Arc::ptr_eq(of, &collider.0)) {
+        seams.edges = find_seams(collider.0.triangles());
+        seams.of = Some(collider.0.clone());
+    }
+    for edge in &seams.edges {
+        let [start, end] = edge.map(|corner| transform.transform_point(corner));
+        gizmos.line(start, end, Color::srgb(1.0, 0.35, 0.1));
+    }
+}
+
+/// Edges of one triangle only, and those whose two triangles have other uvs there.
+fn find_seams(triangles: &MeshTriangles) -> Vec<[Vec3; 2]> {
+    // Both zeros are one place.
+    let key = |point: Vec3| (point + Vec3::ZERO).to_array().map(f32::to_bits);
+    let mut edges: BTreeMap<[[u32; 3]; 2], ([Vec3; 2], [Vec2; 2], u32, bool)> = BTreeMap::new();
+    for (corners, uvs) in triangles.positions.iter().zip(&triangles.uvs) {
+        for side in 0..3 {
+            let (mut from, mut to) = (side, (side + 1) % 3);
+            if key(corners[from]) > key(corners[to]) {
+                (from, to) = (to, from);
+            }
+            let (ends, there) = ([corners[from], corners[to]], [uvs[from], uvs[to]]);
+            let edge = edges.entry(ends.map(key)).or_insert((ends, there, 0, false));
+            edge.2 += 1;
+            edge.3 |= edge.1 != there;
+        }
+    }
+    edges
+        .into_values()
+        .filter(|(_, _, count, breaks)| *count == 1 || *breaks)
+        .map(|(ends, ..)| ends)
+        .collect()
+}
+
+fn draw_emitters(settings: Res<Settings>, emitters: Query<(&Emitter, &GlobalTransform)>, mut gizmos: Gizmos) {
+    if !settings.views.emitters {
+        return;
+    }
+    for (emitter, global) in &emitters {
+        let transform = global.compute_transform();
+        let color = if emitter.enabled { Color::srgb(0.3, 0.75, 1.0) } else { Color::srgb(0.45, 0.45, 0.5) };
+        let (place, turn) = (transform.translation, transform.rotation);
+        let mut way = transform.forward().as_vec3();
+        match emitter.shape {
+            EmitterShape::Sky { half_size } => {
+                way = Vec3::NEG_Y;
+                let lying = Quat::from_rotation_x(std::f32::consts::FRAC_PI_2);
+                gizmos.rect(Isometry3d::new(place, lying), half_size * 2.0, color);
+            }
+            EmitterShape::Box { half_size } => {
+                gizmos.cube(global.mul_transform(Transform::from_scale(half_size * 2.0)), color);
+            }
+            EmitterShape::Cone { radius } | EmitterShape::Disc { radius } => {
+                gizmos.circle(Isometry3d::new(place, turn), radius.max(0.01), color);
+            }
+            EmitterShape::Point => {
+                gizmos.circle(Isometry3d::new(place, turn), 0.02, color);
+            }
+        }
+        gizmos.arrow(place, place + way * 0.4, color);
+    }
+}
+
+fn draw_wind(settings: Res<Settings>, weather: Res<Weather>, scene: Res<CollisionScene>, mut gizmos: Gizmos) {
+    if !settings.views.wind || weather.wind == Vec3::ZERO || scene.is_empty() {
+        return;
+    }
+    let (low, high) = scene.bounds();
+    let start = ((low + high) * 0.5).with_y(high.y + 0.3);
+    gizmos.arrow(start, start + weather.wind, Color::srgb(0.85, 0.6, 1.0));
+}
+
+fn draw_particles(
+    settings: Res<Settings>,
+    particles: Res<Particles>,
+    mut counts: Local<BTreeMap<[i32; 3], u32>>,
+    mut gizmos: Gizmos,
+) {
+    if !settings.views.particles || particles.is_empty() {
+        return;
+    }
+    let corners = particles.positions().iter();
+    let (low, high) = corners
+        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), place| (low.min(*place), high.max(*place)));
+    let cell = ((high - low).max_element() / CELLS).max(0.05);
+    counts.clear();
+    for place in particles.positions() {
+        let index = (*place / cell).floor().as_ivec3().to_array();
+        *counts.entry(index).or_default() += 1;
+    }
+    let most = counts.values().copied().max().unwrap_or(1).max(2);
+    for (index, count) in counts.iter() {
+        let middle = (IVec3::from_array(*index).as_vec3() + 0.5) * cell;
+        let part = (*count as f32).ln() / (most as f32).ln();
+        let color = Color::hsl(240.0 * (1.0 - part), 0.9, 0.55);
+        gizmos.cube(Transform::from_translation(middle).with_scale(Vec3::splat(cell * 0.95)), color);
+    }
+}
+
+fn draw_probe(settings: Res<Settings>, probed: Res<Probed>, mut gizmos: Gizmos) {
+    let Some(hit) = probed.0.filter(|_| settings.tool == Tool::Probe) else { return };
+    let turn = Quat::from_rotation_arc(Vec3::Z, hit.normal);
+    let place = hit.point + hit.normal * 0.002;
+    gizmos.circle(Isometry3d::new(place, turn), 0.02, Color::srgb(1.0, 0.9, 0.2));
+    gizmos.line(place, place + hit.normal * 0.06, Color::srgb(1.0, 0.9, 0.2));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two triangles of a square.
+    fn square(second: [Vec2; 3]) -> MeshTriangles {
+        let [a, b, c, d] = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 0.0, 1.0), Vec3::Z];
+        MeshTriangles {
+            positions: vec![[a, b, c], [a, c, d]],
+            uvs: vec![[Vec2::ZERO, Vec2::X, Vec2::ONE], second],
+            source: vec![0, 1],
+            ..default()
+        }
+    }
+
+    #[test]
+    fn seams_are_where_uvs_break_and_where_the_mesh_ends() {
+        // The rim of a square.
+        assert_eq!(find_seams(&square([Vec2::ZERO, Vec2::ONE, Vec2::Y])).len(), 4);
+        // Its diagonal, too.
+        let far = [Vec2::ZERO, Vec2::ONE, Vec2::Y].map(|uv| uv + 3.0);
+        assert_eq!(find_seams(&square(far)).len(), 5);
+        assert!(find_seams(&MeshTriangles::default()).is_empty());
+    }
+}

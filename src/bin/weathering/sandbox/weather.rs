@@ -1,0 +1,187 @@
+//! The weather: temperature, humidity, wind and sun; and rain over the whole scene, whatever the scenario has.
+
+use bevy::prelude::*;
+use bevy_egui::egui;
+use bevy_weathering::collision::CollisionScene;
+use bevy_weathering::emitter::{Emitter, EmitterShape, Flow};
+use bevy_weathering::weather::{DryingClock, Weather};
+
+use super::effects;
+use super::split::{self, CopyOf, Split};
+use super::ui::{AddPanel, Place};
+use super::widgets::number;
+
+/// Rain or snow that the user has switched on.
+#[derive(Component)]
+pub struct OwnRain;
+
+/// Number of its random stream.
+const STREAM: u32 = u32::MAX - 1;
+
+/// How much falls, and what.
+#[derive(Resource, Debug, Clone, PartialEq)]
+struct Rain {
+    mm_per_h: f32,
+    effect: String,
+    rate: f32,
+}
+
+impl Default for Rain {
+    fn default() -> Self {
+        Self { mm_per_h: 0.0, effect: "rain".into(), rate: 2000.0 }
+    }
+}
+
+pub fn plugin(app: &mut App) {
+    app.init_resource::<Rain>().add_panel(Place::Side, "Weather", show);
+}
+
+fn show(ui: &mut egui::Ui, world: &mut World) {
+    show_rain(ui, world);
+    let before = *world.resource::<Weather>();
+    let mut weather = before;
+    ui.heading("Air");
+    number(ui, "T, C", &mut weather.temperature_c, (-40.0, 60.0), "Temperature; below 0 nothing dries");
+    number(ui, "RH", &mut weather.humidity, (0.0, 1.0), "Relative humidity");
+    let mut speed = Vec2::new(weather.wind.x, weather.wind.z).length();
+    let mut heading_deg = weather.wind.x.atan2(-weather.wind.z).to_degrees();
+    let mut up = weather.wind.y;
+    let (speed_before, heading_before, up_before) = (speed, heading_deg, up);
+    number(ui, "wind, m/s", &mut speed, (0.0, 40.0), "Moves particles and carries vapour away");
+    number(ui, "towards, degrees", &mut heading_deg, (-180.0, 180.0), "0 is -z, 90 is +x");
+    number(ui, "upwards, m/s", &mut up, (-20.0, 20.0), "");
+    if (speed, heading_deg, up) != (speed_before, heading_before, up_before) {
+        weather.wind = wind(speed, heading_deg, up);
+    }
+    ui.heading("Sun");
+    number(ui, "power, W/m2", &mut weather.sun_w_per_m2, (0.0, 1400.0), "On what faces it; dries");
+    let towards = (-weather.sun_direction).normalize_or(Vec3::Y);
+    let mut height_deg = towards.y.clamp(-1.0, 1.0).asin().to_degrees();
+    let mut around_deg = towards.x.atan2(-towards.z).to_degrees();
+    let angles = (height_deg, around_deg);
+    number(ui, "height, degrees", &mut height_deg, (1.0, 89.0), "Above the horizon");
+    number(ui, "around, degrees", &mut around_deg, (-180.0, 180.0), "0 is -z, 90 is +x");
+    let moved = (height_deg, around_deg) != angles;
+    if moved {
+        weather.sun_direction = -towards_sun(height_deg, around_deg);
+    }
+    show_light(ui, world, moved.then_some(weather.sun_direction));
+    ui.heading("Drying");
+    number(ui, "times as fast", &mut weather.drying_speed, (0.0, 100_000.0), "It takes hours in the world");
+    let demand = weather.demand_mm_per_h();
+    ui.label(format!("a wet surface loses {:.2} mm/h, {:.2} more in the sun", demand.air_mm, demand.sun_mm));
+    let points = world.resource::<DryingClock>().points().len();
+    ui.small(format!("{points} changes of the weather so far"));
+    if weather != before {
+        *world.resource_mut::<Weather>() = weather;
+    }
+}
+
+/// From speed along the ground, m/s, where it goes to, degrees, and speed upwards, m/s.
+fn wind(speed: f32, heading_deg: f32, up: f32) -> Vec3 {
+    let (sin, cos) = heading_deg.to_radians().sin_cos();
+    Vec3::new(sin * speed, up, -cos * speed)
+}
+
+/// From height above the horizon and direction, degrees.
+fn towards_sun(height_deg: f32, around_deg: f32) -> Vec3 {
+    let (sin, cos) = height_deg.to_radians().sin_cos();
+    let (east, north) = around_deg.to_radians().sin_cos();
+    Vec3::new(east * cos, sin, -north * cos)
+}
+
+/// The light of the sun, which follows where it shines to.
+fn show_light(ui: &mut egui::Ui, world: &mut World, direction: Option<Vec3>) {
+    let mut lights = world.query::<(&mut DirectionalLight, &mut Transform)>();
+    let Some((mut light, mut transform)) = lights.iter_mut(world).next() else { return };
+    let mut lux = light.illuminance;
+    number(ui, "light, lux", &mut lux, (0.0, 130_000.0), "How bright it shows the scene");
+    if lux != light.illuminance {
+        light.illuminance = lux;
+    }
+    if let Some(direction) = direction {
+        *transform = transform.looking_to(direction, Vec3::Y);
+    }
+}
+
+fn show_rain(ui: &mut egui::Ui, world: &mut World) {
+    let before = world.resource::<Rain>().clone();
+    let mut rain = before.clone();
+    ui.heading("Rain over the scene");
+    number(ui, "rain, mm/h", &mut rain.mm_per_h, (0.0, 200.0), "0 is none; 10 is strong, 50 a cloudburst");
+    egui::ComboBox::from_label("falls").selected_text(rain.effect.as_str()).show_ui(ui, |ui| {
+        for name in ["rain", "drizzle", "snow", "dust"] {
+            ui.selectable_value(&mut rain.effect, name.to_owned(), name);
+        }
+    });
+    number(ui, "particles/s", &mut rain.rate, (10.0, 50_000.0), "Each stands for the drops of a patch");
+    if rain == before {
+        return;
+    }
+    *world.resource_mut::<Rain>() = rain.clone();
+    let mut emitters = world.query_filtered::<Entity, (With<OwnRain>, Without<CopyOf>)>();
+    let clouds: Vec<Entity> = emitters.iter(world).collect();
+    if rain.mm_per_h <= 0.0 {
+        clouds.into_iter().for_each(|cloud| {
+            world.despawn(cloud);
+        });
+        return;
+    }
+    let scene = world.resource::<CollisionScene>();
+    let (low, high) = split::bounds(world.get_resource::<Split>(), scene);
+    let Some((half_size, place)) = above(low, high) else { return };
+    let Some(effect) = effects::shipped(world, &rain.effect) else { return };
+    let emitter = Emitter {
+        effect,
+        rate: rain.rate,
+        shape: EmitterShape::Sky { half_size },
+        flow: Flow::MmPerHour(rain.mm_per_h),
+        speed: 0.0,
+        lifetime: 60.0,
+        stream: STREAM,
+        ..default()
+    };
+    if let Some(&cloud) = clouds.first() {
+        if let Some(mut there) = world.get_mut::<Emitter>(cloud) {
+            *there = emitter;
+        }
+        return;
+    }
+    let transform = Transform::from_translation(place);
+    world.spawn((Name::new("rain over the scene"), OwnRain, emitter, transform));
+}
+
+/// Half the size of a rectangle over a box, with some to spare, and where it is.
+fn above(low: Vec3, high: Vec3) -> Option<(Vec2, Vec3)> {
+    let size = high - low;
+    let spare = 0.1 * size.max_element();
+    let half_size = Vec2::new(size.x, size.z) * 0.5 + spare;
+    let middle = (low + high) * 0.5;
+    let is_there = size.is_finite() && size.min_element() >= 0.0;
+    is_there.then(|| (half_size, middle.with_y(high.y + 1.0 + spare)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_and_directions_belong_together() {
+        for (height, around) in [(10.0, -170.0), (45.0, 0.0), (80.0, 90.0)] {
+            let towards = towards_sun(height, around);
+            assert!((towards.length() - 1.0).abs() < 1e-5);
+            assert!((towards.y.asin().to_degrees() - height).abs() < 1e-3);
+            assert!((towards.x.atan2(-towards.z).to_degrees() - around).abs() < 1e-3);
+        }
+        assert!((wind(3.0, 90.0, 1.0) - Vec3::new(3.0, 1.0, 0.0)).length() < 1e-5);
+        assert!((wind(2.0, 0.0, 0.0) - Vec3::new(0.0, 0.0, -2.0)).length() < 1e-5);
+    }
+
+    #[test]
+    fn rain_covers_the_scene_and_none_falls_on_nothing() {
+        let (half_size, place) = above(Vec3::new(-1.0, 0.0, 2.0), Vec3::new(3.0, 2.0, 4.0)).unwrap();
+        assert!(half_size.x > 2.0 && half_size.y > 1.0 && place.y > 2.0, "{half_size} {place}");
+        assert_eq!((place.x, place.z), (1.0, 3.0));
+        assert_eq!(above(Vec3::INFINITY, Vec3::NEG_INFINITY), None);
+    }
+}

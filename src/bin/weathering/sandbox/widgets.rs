@@ -1,0 +1,36 @@
+//! Sliders and the like, all alike.
+
+use bevy_egui::egui::{self, Ui};
+use bevy_weathering::material::range_of;
+
+/// A number within a range. Wide ranges are logarithmic. What is out of it already stays so until somebody edits it.
+pub fn number(ui: &mut Ui, label: &str, value: &mut f32, (least, most): (f32, f32), about: &str) {
+    let is_wide = least >= 0.0 && most > 50.0 * least.max(1.0);
+    let slider = egui::Slider::new(value, least..=most)
+        .logarithmic(is_wide)
+        .smallest_positive(1e-3)
+        .clamping(egui::SliderClamping::Edits)
+        .text(label);
+    let slider = ui.add(slider);
+    if !about.is_empty() {
+        slider.on_hover_text(format!("{about}\n{least} to {most}"));
+    }
+}
+
+/// A number of a material, by the name of its field. `symbol`: as papers have it; `most`: what a slider reaches up to, if the
+/// allowed range is far wider; more can be typed.
+pub fn parameter(ui: &mut Ui, symbol: &str, field: &str, value: &mut f32, most: Option<f32>, about: &str) {
+    let Some((least, allowed)) = range_of(field) else { return };
+    let most = most.unwrap_or(allowed).min(allowed);
+    let is_wide = most > 50.0 * least.max(1.0) || (least > 0.0 && most > 500.0 * least);
+    let slider = egui::Slider::new(value, least..=most)
+        .logarithmic(is_wide)
+        .smallest_positive(1e-3)
+        .clamping(egui::SliderClamping::Never)
+        .text(symbol);
+    ui.add(slider).on_hover_text(format!("{field}: {about}\n{least} to {allowed}"));
+    // What is typed may be anything.
+    if !(*value >= least && *value <= allowed) {
+        *value = if value.is_nan() { least } else { value.clamp(least, allowed) };
+    }
+}
