@@ -12,6 +12,7 @@ use bevy::time::TimeUpdateStrategy;
 use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
 use bevy_weathering::WeatheringPlugins;
+use bevy_weathering::overlay::SplatBudget;
 
 /// Frames hold no tick: what is there stays as it is, and what is timed is drawing alone.
 pub fn app() -> App {
@@ -28,6 +29,8 @@ pub fn app() -> App {
             .disable::<PanicHandlerPlugin>(),
     )
     .add_plugins(WeatheringPlugins)
+    // What is pushed at once is timed in one frame.
+    .insert_resource(SplatBudget::LARGEST)
     .insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
     app.finish();
     app.cleanup();

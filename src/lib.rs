@@ -12,6 +12,7 @@ pub mod material;
 pub mod matter;
 pub mod output;
 pub mod overlay;
+pub mod overload;
 pub mod particle;
 pub mod picture;
 pub mod replay;
@@ -38,6 +39,7 @@ pub mod prelude {
     pub use crate::emitter::{Emitter, EmitterShape, Flow};
     pub use crate::material::{PorousMaterial, StandingWater, WettingModel};
     pub use crate::overlay::{MapBudget, OverlayUv, Weatherable, Wrap};
+    pub use crate::overload::{LiveBudget, LiveBudgetPlugin};
     pub use crate::particle::Forces;
     pub use crate::schedule::{WeatheringSystems, WeatheringTick};
     pub use crate::weather::Weather;
@@ -60,6 +62,7 @@ pub mod prelude {
 /// | [`MatterPlugin`](matter::MatterPlugin) | gives surfaces room for dust, mud and snow | no |
 /// | [`WettingPlugin`](wetting::WettingPlugin) | absorbs, moves and dries water | no |
 /// | [`BrushPlugin`](brush::BrushPlugin) | wets, dries, dirties and cleans by hand | no |
+/// | [`OverloadDiagnosticsPlugin`](overload::OverloadDiagnosticsPlugin) | counts what was held back | no |
 /// | [`GpuOverlayPlugin`](overlay::GpuOverlayPlugin) | paints splats into maps | yes |
 /// | [`WaterUploadPlugin`](wetting::gpu::WaterUploadPlugin) | sends water to be drawn | yes |
 /// | [`ParticleDrawPlugin`](particle::ParticleDrawPlugin) | draws particles in flight | yes |
@@ -84,6 +87,7 @@ impl PluginGroup for WeatheringPlugins {
             .add(matter::MatterPlugin)
             .add(wetting::WettingPlugin)
             .add(brush::BrushPlugin)
+            .add(overload::OverloadDiagnosticsPlugin)
             .add(overlay::GpuOverlayPlugin)
             .add(wetting::gpu::WaterUploadPlugin)
             .add(particle::ParticleDrawPlugin)

@@ -56,11 +56,52 @@ impl Plugin for WeatheringSchedulePlugin {
         })
         .configure_sets(WeatheringTick, (First, Emit, Integrate, Trace, Deposit, Flow, Last).chain())
         .configure_sets(WeatheringTick, RetireParticles.in_set(Trace))
+        .register_type::<TickHold>()
+        .init_resource::<TickHold>()
         .add_systems(FixedUpdate, run_tick);
     }
 }
 
+/// Lets ticks be left out. Weather time stands still then, whatever Bevy's fixed time does: nothing is emitted, nothing dries and
+/// nothing is lost.
+#[derive(Resource, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[reflect(Resource)]
+pub struct TickHold {
+    /// Whether the next tick is left out. Set by those who cannot keep up: so that maps are painted whole,
+    /// [`GpuOverlayPlugin`](crate::overlay::GpuOverlayPlugin).
+    pub is_held: bool,
+    /// Ticks left out so far.
+    pub ticks: u64,
+}
+
 /// The whole tick, as one system that others in [`FixedUpdate`] can be ordered against.
 pub fn run_tick(world: &mut World) {
+    if let Some(mut hold) = world.get_resource_mut::<TickHold>()
+        && hold.is_held
+    {
+        hold.ticks += 1;
+        return;
+    }
     world.run_schedule(WeatheringTick);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Resource, Default)]
+    struct Ran(u32);
+
+    #[test]
+    fn held_ticks_are_counted_and_not_run() {
+        let mut app = App::new();
+        app.add_plugins(WeatheringSchedulePlugin)
+            .init_resource::<Ran>()
+            .add_systems(WeatheringTick, |mut ran: ResMut<Ran>| ran.0 += 1);
+        for (is_held, expected) in [(false, (1, 0)), (true, (1, 1)), (true, (1, 2)), (false, (2, 2))] {
+            app.world_mut().resource_mut::<TickHold>().is_held = is_held;
+            run_tick(app.world_mut());
+            assert_eq!((app.world().resource::<Ran>().0, app.world().resource::<TickHold>().ticks), expected);
+        }
+    }
 }

@@ -53,6 +53,8 @@ mod layout;
 mod matter;
 /// What a replay makes of its numbers and pictures, and many replays at once.
 mod outputs;
+/// More than a machine can do.
+mod overload;
 /// One budget for the maps of all surfaces.
 mod pool;
 /// Skinned meshes in their pose.

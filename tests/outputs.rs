@@ -125,7 +125,7 @@ fn plots_have_lines_and_units() {
         ("wetness", "part of the area", 3),
         ("film", "mm", 3),
         ("absorbed", "mm", 3),
-        ("water", "ml", 7),
+        ("water", "ml", 8),
         ("particles", "particles", 3),
         ("timings", "ms", 8),
     ] {

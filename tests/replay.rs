@@ -420,7 +420,7 @@ fn bad_scenarios_are_refused_by_file_field_and_value() {
 fn a_surface_without_room_for_its_maps_is_told_of_and_accounted_for() {
     let tree = Tree::new();
     let out = tree.path("out");
-    for (budget, side) in [("(mib: 0.001)", 0), ("(texel_mm: 10.0)", 112), ("(mib: 0.5)", 128), ("()", 256)] {
+    for (budget, side) in [("(mib: 0.001)", 0), ("(texel_mm: 10.0)", 112), ("(mib: 0.6)", 128), ("()", 256)] {
         let file = tree.spoilt("seconds: 1.0", &format!("seconds: 1.0, map_budget: {budget}"));
         run(replay(&file, "--no-render --out").arg(&out)).assert_success();
         let report = read_report(&out);

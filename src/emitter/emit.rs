@@ -4,11 +4,12 @@ use bevy::prelude::*;
 use rand_pcg::Pcg32;
 use serde::{Deserialize, Serialize};
 
+use super::detail::Deal;
 use super::shape::unit;
-use super::{EmissionSeed, Emitter};
+use super::{EmissionDetail, EmissionSeed, Emitter};
 use crate::clock::WeatheringClock;
 use crate::effect::drops::SIZE_CLASSES;
-use crate::effect::{DropSizes, EffectTable};
+use crate::effect::{DropSizes, EffectIndex, EffectTable, WeatherEffect};
 use crate::particle::{Lifespan, Particle, ParticleConfig, ParticleCounts, Particles, Sequence, WaterCounts};
 
 /// What an [`Emitter`] has sent out and still owes.
@@ -18,6 +19,9 @@ pub struct EmitterState {
     owed: f64,
     /// Water owed below a whole nanolitre.
     owed_nl: f64,
+    /// Of a flow: water, nanolitres, of particles that were not sent and that no other could take along yet.
+    #[serde(default)]
+    held_nl: f64,
     rng: Option<Pcg32>,
     /// Particles sent out so far.
     pub emitted: u64,
@@ -42,9 +46,34 @@ impl EmitterState {
         (count as u32, (hz - before) / rate, hz / rate)
     }
 
+    /// What each of `count` particles of a flow stands for, nanolitres, if `due` of `each_nl` were to be sent: all their water,
+    /// and what was held before. At most what a particle may carry; the rest is held.
+    fn share_nl(&mut self, due: u32, count: u32, each_nl: f64) -> f64 {
+        if count == due && self.held_nl == 0.0 {
+            return each_nl;
+        }
+        self.held_nl += f64::from(due) * each_nl;
+        if count == 0 {
+            return 0.0;
+        }
+        let most = f64::from(WeatherEffect::MAX_VOLUME_MM3) * 1000.0;
+        let share = self.held_nl / f64::from(count);
+        if share <= most {
+            self.held_nl = 0.0;
+            return share;
+        }
+        self.held_nl -= most * f64::from(count);
+        most
+    }
+
+    /// Of a flow: water of particles that limits kept from being sent and that no other has taken along yet, mm³.
+    pub fn held_mm3(&self) -> f64 {
+        self.held_nl / 1000.0
+    }
+
     /// Whole nanolitres of the next particle; what is cut off goes to the one after.
-    fn water_nl(&mut self, water_mm3: f32) -> u32 {
-        self.owed_nl += f64::from(water_mm3) * 1000.0;
+    fn water_nl(&mut self, water_nl: f64) -> u32 {
+        self.owed_nl += water_nl;
         let whole = self.owed_nl.floor();
         self.owed_nl -= whole;
         whole as u32
@@ -88,16 +117,33 @@ impl NewParticles {
     }
 }
 
-/// Lets every enabled emitter, in the order of their streams, write the particles it owes.
+/// An emitter's turn in a tick.
+#[derive(Debug, Clone, Copy)]
+pub struct Turn {
+    emitter: Entity,
+    number: u32,
+    /// Emitters with the same number that came before.
+    twins: u32,
+    effect: EffectIndex,
+    due: u32,
+    /// When within the tick the first is born, and the time between two; ticks.
+    first: f64,
+    interval: f64,
+}
+
+/// Lets every enabled emitter, in the order of their streams, write the particles it owes, or, where there is not room for all,
+/// its part of them.
 pub fn emit_particles(
     clock: Res<WeatheringClock>,
     seed: Res<EmissionSeed>,
     config: Res<ParticleConfig>,
+    mut detail: ResMut<EmissionDetail>,
     mut effects: ResMut<EffectTable>,
     mut counts: ResMut<ParticleCounts>,
     mut water: ResMut<WaterCounts>,
     mut new: ResMut<NewParticles>,
     mut order: Local<Vec<(u32, Entity)>>,
+    mut turns: Local<Vec<Turn>>,
     mut emitters: Query<(&Emitter, &mut EmitterState, &GlobalTransform)>,
     streams: Query<(&Emitter, Entity)>,
 ) {
@@ -105,26 +151,44 @@ pub fn emit_particles(
     order.extend(streams.iter().map(|(emitter, id)| (emitter.stream, id)));
     order.sort_unstable();
 
+    // What all owe comes first: where there is less room, all are cut alike.
+    turns.clear();
     let (mut stream, mut twins) = (None, 0u32);
     for &(number, entity) in order.iter() {
         twins = if stream.replace(number) == Some(number) { twins + 1 } else { 0 };
-        let Ok((emitter, mut state, transform)) = emitters.get_mut(entity) else { continue };
+        let Ok((emitter, mut state, _)) = emitters.get_mut(entity) else { continue };
         if !emitter.enabled || emitter.rate <= 0.0 {
             continue;
         }
-        let Some(index) = effects.index_of(&emitter.effect) else { continue };
+        let Some(effect) = effects.index_of(&emitter.effect) else { continue };
+        if effects.row(effect).is_none() {
+            continue;
+        }
+        let (due, first, interval) = state.due(emitter.rate, clock.hz());
+        turns.push(Turn { emitter: entity, number, twins, effect, due, first, interval });
+    }
+    let asked: u64 = turns.iter().map(|turn| u64::from(turn.due)).sum();
+    let room = u64::from(config.max_alive).saturating_sub(counts.alive + new.particles.len() as u64);
+    let mut deal = Deal::new(asked, detail.bypass_change_detection().allow(asked).min(room), clock.tick());
+
+    for turn in turns.iter() {
+        let &Turn { number, twins, effect: index, due, first, interval, .. } = turn;
+        let Ok((emitter, mut state, transform)) = emitters.get_mut(turn.emitter) else { continue };
         let Some(row) = effects.row(index) else { continue };
         let Some(effect) = &row.effect else { continue };
-        let volume_mm3 = emitter.particle_mm3(effect);
-
         let state = &mut *state;
         // Emitters that share a number do not send the same particles.
         let own_stream = || Pcg32::new(seed.0, u64::from(number) | u64::from(twins) << 32);
         let mut rng = state.rng.take().unwrap_or_else(own_stream);
-        let (due, first, interval) = state.due(emitter.rate, clock.hz());
-        let room = u64::from(config.max_alive).saturating_sub(counts.alive + new.particles.len() as u64);
-        let count = u64::from(due).min(room) as u32;
-        counts.refused += u64::from(due - count);
+        let count = deal.take(due);
+        let each_nl = f64::from(emitter.particle_mm3(effect)) * 1000.0;
+        let share_nl = if emitter.has_flow() {
+            counts.merged += u64::from(due - count);
+            state.share_nl(due, count, each_nl)
+        } else {
+            counts.refused += u64::from(due - count);
+            each_nl
+        };
         state.emitted += u64::from(count);
 
         let world_from_emitter = transform.affine();
@@ -137,8 +201,10 @@ pub fn emit_particles(
             };
             let fall_speed = row.terminal_speed(usize::from(class));
             let (position, velocity) = emitter.sample(&world_from_emitter, &mut rng, fall_speed);
-            let born_at = ((first + f64::from(i) * interval) * 65_536.0).clamp(0.0, 65_535.0) as u16;
-            let volume_nl = state.water_nl(volume_mm3);
+            // Those that are sent are spread evenly over those that are due.
+            let place = u64::from(i) * u64::from(due) / u64::from(count);
+            let born_at = ((first + place as f64 * interval) * 65_536.0).clamp(0.0, 65_535.0) as u16;
+            let volume_nl = state.water_nl(share_nl);
             water.emitted_nl += u64::from(row.water_nl(volume_nl));
             let lifespan = Lifespan { ticks_left, born_at };
             new.push(|sequence| Particle {
@@ -170,14 +236,14 @@ pub fn spawn_particles(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effect::WeatherEffect;
-    use crate::emitter::EmitterShape;
+    use crate::emitter::{EmitterShape, Flow};
 
     fn world(hz: u32, effect: WeatherEffect) -> World {
         let mut world = World::new();
         world.insert_resource(WeatheringClock::new(hz));
         world.insert_resource(EmissionSeed(7));
         world.init_resource::<ParticleConfig>();
+        world.init_resource::<EmissionDetail>();
         world.init_resource::<ParticleCounts>();
         world.init_resource::<WaterCounts>();
         world.init_resource::<NewParticles>();
@@ -248,6 +314,67 @@ mod tests {
         run(&mut world, 3);
         let counts = world.resource::<ParticleCounts>();
         assert_eq!((counts.emitted, counts.alive, counts.refused), (100, 100, 500));
+    }
+
+    /// A hose of 6 l/min, 100 ml/s, by a rate.
+    fn hose(rate: f32, stream: u32) -> Emitter {
+        Emitter { rate, stream, flow: Flow::LitresPerMinute(6.0), ..default() }
+    }
+
+    fn sent_nl(world: &World) -> u64 {
+        world.resource::<Particles>().volumes_nl().iter().copied().map(u64::from).sum()
+    }
+
+    #[test]
+    fn fewer_particles_of_a_flow_carry_all_its_water() {
+        let all = |factor: f32| {
+            let mut world = world(60, WeatherEffect::default());
+            world.resource_mut::<EmissionDetail>().set_factor(factor);
+            let emitter = world.spawn(hose(6000.0, 0)).id();
+            run(&mut world, 600);
+            let held = world.get::<EmitterState>(emitter).unwrap().held_mm3();
+            (sent_nl(&world) as f64 + held * 1000.0, *world.resource::<ParticleCounts>())
+        };
+        for factor in [1.0, 0.7, 0.05, 0.001] {
+            let (nl, counts) = all(factor);
+            // A litre in ten seconds.
+            assert!((nl / 1.0e9 - 1.0).abs() < 1e-6, "{factor}: {nl}");
+            assert_eq!((counts.emitted + counts.merged, counts.refused), (60_000, 0));
+            let sent = 60_000.0 * f64::from(factor);
+            assert!((counts.emitted as f64 - sent).abs() <= 1.0, "{factor}: {counts:?}");
+        }
+    }
+
+    #[test]
+    fn the_cap_cuts_all_alike_holds_water_and_lets_it_go_when_there_is_room() {
+        let mut world = world(60, WeatherEffect::default());
+        world.insert_resource(ParticleConfig { max_alive: 100 });
+        let hoses = [0, 1].map(|stream| world.spawn(hose(6000.0, stream)).id());
+        world.spawn(Emitter { rate: 6000.0, stream: 2, ..default() });
+        run(&mut world, 2);
+        let counts = *world.resource::<ParticleCounts>();
+        assert_eq!((counts.emitted, counts.merged + counts.refused), (100, 500));
+        assert!((160..=168).contains(&counts.refused), "{counts:?}");
+        let of = |world: &World| hoses.map(|hose| world.get::<EmitterState>(hose).unwrap().clone());
+        assert!(of(&world).iter().all(|state| (30..=37).contains(&state.emitted)), "{:?}", of(&world));
+        // The second tick had no room: its water waits.
+        let held: f64 = of(&world).iter().map(EmitterState::held_mm3).sum();
+        assert!((held - 2.0 * 100_000.0 / 60.0).abs() < 1.0, "{held}");
+        world.resource_mut::<ParticleConfig>().max_alive = 1000;
+        run(&mut world, 1);
+        assert!(of(&world).iter().all(|state| state.held_mm3() == 0.0));
+        let plain_nl =
+            world.resource::<Particles>().volumes_nl().iter().filter(|&&nl| nl == 4190 || nl == 4189);
+        assert!(plain_nl.count() > 100);
+    }
+
+    #[test]
+    fn a_particle_takes_no_more_than_it_may_carry() {
+        let mut state = EmitterState::default();
+        assert_eq!(state.share_nl(3, 3, 4.0), 4.0);
+        assert_eq!(state.share_nl(1000, 0, 4.0e6), 0.0);
+        assert_eq!((state.share_nl(0, 2, 4.0e6), state.held_mm3()), (1.0e9, 2.0e6));
+        assert_eq!((state.share_nl(0, 4, 4.0e6), state.held_mm3()), (5.0e8, 0.0));
     }
 
     #[test]

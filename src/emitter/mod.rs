@@ -2,9 +2,11 @@
 //!
 //! An [`Emitter`] sits on an entity with a `Transform` and sends particles along the entity's forward axis
 //! (local -Z). How many it owes is kept as an exact remainder: 1,000/s for 10 s are 10,000 particles at any tick
-//! rate. Within a tick they are born evenly spread, so a jet is a jet and no row of clouds. Each emitter has its
-//! own random stream, seeded by [`EmissionSeed`] and the emitter's number; nothing else draws from it.
+//! rate. Within a tick they are born evenly spread, so a jet is a jet and no row of clouds. Where there is no room for
+//! all, fewer stand for more ([`EmissionDetail`]). Each emitter has its own random stream, seeded by [`EmissionSeed`]
+//! and the emitter's number; nothing else draws from it.
 
+mod detail;
 mod emit;
 mod shape;
 
@@ -15,6 +17,7 @@ use serde::{Deserialize, Serialize};
 use crate::effect::WeatherEffect;
 use crate::schedule::{WeatheringSystems, WeatheringTick};
 
+pub use detail::EmissionDetail;
 pub use emit::{EmitterState, NewParticles, emit_particles, spawn_particles};
 
 /// Sends out particles of one effect. Configuration only; see [`EmitterState`] for what it has done.
@@ -81,16 +84,26 @@ impl Emitter {
         Self { effect, flow: Flow::LitresPerMinute(litres_per_minute), shape, speed, ..Self::default() }
     }
 
-    /// What a particle carries, mm³.
-    pub fn particle_mm3(&self, effect: &WeatherEffect) -> f32 {
-        let mm3_per_second = match (self.flow, self.shape) {
+    /// What it sends out, mm³/s, if that is given; else what it sends out depends on its rate.
+    fn mm3_per_second(&self) -> Option<f32> {
+        match (self.flow, self.shape) {
+            // A millimetre on a square metre is a litre.
             (Flow::MmPerHour(rate), EmitterShape::Sky { half_size }) => {
-                // A millimetre on a square metre is a litre.
-                rate * 4.0 * half_size.x * half_size.y * 1.0e6 / 3600.0
+                Some(rate * 4.0 * half_size.x * half_size.y * 1.0e6 / 3600.0)
             }
-            (Flow::LitresPerMinute(litres), _) => litres * 1.0e6 / 60.0,
-            _ => return effect.volume_mm3,
-        };
+            (Flow::LitresPerMinute(litres), _) => Some(litres * 1.0e6 / 60.0),
+            _ => None,
+        }
+    }
+
+    /// Whether how much it sends out is given, whatever the number of its particles.
+    pub fn has_flow(&self) -> bool {
+        self.mm3_per_second().is_some()
+    }
+
+    /// What a particle carries, mm³, if all that are due are sent.
+    pub fn particle_mm3(&self, effect: &WeatherEffect) -> f32 {
+        let Some(mm3_per_second) = self.mm3_per_second() else { return effect.volume_mm3 };
         (mm3_per_second / self.rate.max(1e-6)).clamp(0.0, WeatherEffect::MAX_VOLUME_MM3)
     }
 }
@@ -144,7 +157,9 @@ impl Plugin for EmitterPlugin {
     fn build(&self, app: &mut App) {
         app.register_type::<Emitter>()
             .register_type::<EmissionSeed>()
+            .register_type::<EmissionDetail>()
             .init_resource::<EmissionSeed>()
+            .init_resource::<EmissionDetail>()
             .init_resource::<NewParticles>()
             .add_systems(
                 WeatheringTick,

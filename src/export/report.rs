@@ -91,6 +91,7 @@ impl ExportReport {
                 hit: counts.hit,
                 expired: counts.expired,
                 refused: counts.refused,
+                merged: counts.merged,
             },
             water: outcome.water,
             surfaces,

@@ -17,6 +17,7 @@
 //! All maps share a [`MapBudget`]. A surface has none until that gives it a [`MapSize`] (`pool`).
 
 mod atlas;
+mod budget;
 mod cpu;
 pub mod deposit;
 mod frames;
@@ -35,6 +36,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use atlas::StampAtlas;
+pub use budget::SplatBudget;
 pub use cpu::{CpuMaps, CpuOverlayPlugin};
 pub(crate) use deposit::measure_texels;
 pub use deposit::{DepositPlugin, PrepareStamps, SplatQueue, SurfaceTotals, SurfaceTraces, deposit_splats};

@@ -46,12 +46,32 @@ impl TileBins {
         headers: &mut Vec<TileHeader>,
         list: &mut Vec<u32>,
     ) {
+        self.bin_within(usize::MAX, splats, size, wrap, frames, first_splat, headers, list);
+    }
+
+    /// The same of the first splats only: one, and as many more as begin within so many [bytes](Self::bytes). Returns how many.
+    pub fn bin_within(
+        &mut self,
+        bytes: usize,
+        splats: &[Splat],
+        size: u32,
+        wrap: [Wrap; 2],
+        frames: Option<&SurfaceFrames>,
+        first_splat: u32,
+        headers: &mut Vec<TileHeader>,
+        list: &mut Vec<u32>,
+    ) -> usize {
         let side = (size / TILE_SIZE) as usize;
         if self.counts.len() < side * side {
             self.counts.resize(side * side, 0);
         }
         let Self { counts, touched, pairs } = self;
+        let mut taken = 0;
         for (splat, number) in splats.iter().zip(first_splat..) {
+            if taken > 0 && Self::bytes(taken, touched.len(), pairs.len()) >= bytes {
+                break;
+            }
+            taken += 1;
             let mut touch = |tile: u32| {
                 let count = &mut counts[tile as usize];
                 if *count == 0 {
@@ -87,6 +107,12 @@ impl TileBins {
             self.counts[tile as usize] = 0;
         }
         self.pairs.clear();
+        taken
+    }
+
+    /// Bytes of so many splats, tiles and entries of the list.
+    pub fn bytes(splats: usize, tiles: usize, entries: usize) -> usize {
+        splats * size_of::<Splat>() + tiles * size_of::<TileHeader>() + entries * size_of::<u32>()
     }
 }
 
@@ -145,5 +171,22 @@ mod tests {
         let tiles = tiles_of(&[largest], 64, [Wrap::Repeat; 2]);
         assert_eq!(tiles.len(), 16);
         assert!(tiles.iter().all(|(_, splats)| splats == &[0]));
+    }
+
+    #[test]
+    fn a_batch_ends_where_its_bytes_are_used_up() {
+        let splats = [splat([8, 8], 2), splat([16, 8], 2), splat([9, 9], 2)];
+        // The second lies in two tiles.
+        let two = TileBins::bytes(2, 2, 3);
+        for (bytes, expected) in
+            [(0, 1), (TileBins::bytes(1, 1, 1), 1), (two, 2), (two + 1, 3), (usize::MAX, 3)]
+        {
+            let (mut bins, mut headers, mut list) = (TileBins::default(), vec![], vec![]);
+            let wrap = [Wrap::Repeat; 2];
+            let taken = bins.bin_within(bytes, &splats, 64, wrap, None, 0, &mut headers, &mut list);
+            assert_eq!(taken, expected, "{bytes}");
+            assert!(list.iter().all(|&number| (number as usize) < taken));
+            assert_eq!(headers.iter().map(|tile| tile.count).sum::<u32>() as usize, list.len());
+        }
     }
 }

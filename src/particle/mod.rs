@@ -107,8 +107,13 @@ pub struct ParticleCounts {
     pub hit: u64,
     /// Particles whose lifetime ran out.
     pub expired: u64,
-    /// Particles not spawned because [`ParticleConfig::max_alive`] was reached; not part of `emitted`.
+    /// Particles of emitters without a [`Flow`](crate::emitter::Flow) that were not spawned, for want of room
+    /// ([`ParticleConfig::max_alive`]) or detail ([`EmissionDetail`](crate::emitter::EmissionDetail)); not part of `emitted`.
+    /// What they would carry is missing.
     pub refused: u64,
+    /// The same of emitters with a flow; others carry what they would.
+    #[serde(default)]
+    pub merged: u64,
 }
 
 /// The water of all particles so far, nanolitres. `emitted` and what surfaces dripped is what they received, what expired,
@@ -135,7 +140,9 @@ impl WaterCounts {
 #[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
 #[reflect(Resource)]
 pub struct ParticleConfig {
-    /// The most particles that may be in flight; what emitters would add beyond it is counted as refused.
+    /// The most particles that may be in flight. What emitters would add beyond it is cut from all alike, and counted as
+    /// [refused](ParticleCounts::refused) or [merged](ParticleCounts::merged). Drips always fall: emitters make room for
+    /// them.
     pub max_alive: u32,
 }
 

@@ -65,7 +65,7 @@ mod tests {
         left.sort_unstable_by_key(|particle| particle.sequence);
         assert_eq!(left.iter().map(|particle| particle.sequence.0).collect::<Vec<_>>(), [0, 3]);
         assert_eq!(left[0].lifespan, Lifespan { ticks_left: 3, born_at: 0 });
-        let expected = ParticleCounts { emitted: 4, alive: 2, hit: 1, expired: 1, refused: 0 };
+        let expected = ParticleCounts { emitted: 4, alive: 2, hit: 1, expired: 1, ..default() };
         assert_eq!(*world.resource::<ParticleCounts>(), expected);
         assert_eq!(world.resource::<WaterCounts>().expired_nl, [0, 11]);
     }

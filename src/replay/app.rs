@@ -78,7 +78,8 @@ pub(super) fn build(options: &ReplayOptions, scenario: ScenarioPlugin) -> App {
                 .disable::<PanicHandlerPlugin>()
                 .disable::<TerminalCtrlCHandlerPlugin>(),
         )
-        .add_plugins(WeatheringPlugins);
+        .add_plugins(WeatheringPlugins)
+        .insert_resource(options.splats);
     } else {
         app = headless(tasks, assets);
     }

@@ -11,9 +11,7 @@ use super::{ReplayError, Run, give_up_after};
 use crate::clock::WeatheringClock;
 use crate::material::PorousMaterial;
 use crate::matter::SurfaceMatter;
-use crate::overlay::{
-    CpuMaps, MapLoss, MapSize, Overlays, SplatStats, SurfaceTotals, TILE_SIZE, Weatherable,
-};
+use crate::overlay::{CpuMaps, MapLoss, MapSize, Overlays, SplatQueue, SplatStats, TILE_SIZE, Weatherable};
 use crate::picture::{square, write_picture};
 use crate::scenario::ScenarioSurface;
 use crate::weather::DryingClock;
@@ -49,12 +47,6 @@ pub struct SurfaceMaps {
     pub loss: MapLoss,
     /// Ticks per second of `since`.
     pub hz: u32,
-}
-
-/// Impacts so far that found maps.
-pub(super) fn to_be_painted(world: &mut World) -> u64 {
-    let mut totals = world.query::<(&SurfaceTotals, &MapLoss)>();
-    totals.iter(world).map(|(totals, loss)| totals.impacts.saturating_sub(loss.unpainted)).sum()
 }
 
 impl SurfaceMaps {
@@ -168,16 +160,25 @@ impl Run<'_> {
         Ok(surfaces.into_iter().map(|(_, _, maps)| maps).collect())
     }
 
+    /// Splats that are not painted yet, wherever they are. None are without a renderer: they are painted in their tick.
+    pub(super) fn waiting(&mut self) -> u64 {
+        let world = self.app.world_mut();
+        let Some(pending) = world.get_resource::<SplatStats>().map(SplatStats::pending) else { return 0 };
+        let mut queues = world.query::<&SplatQueue>();
+        pending + queues.iter(world).map(|queue| queue.splats().len() as u64).sum::<u64>()
+    }
+
     /// Runs frames until the GPU has painted every impact.
-    fn finish_painting(&mut self) -> Result<(), ReplayError> {
-        let begun = Instant::now();
+    pub(super) fn finish_painting(&mut self) -> Result<(), ReplayError> {
+        let (mut begun, mut least) = (Instant::now(), u64::MAX);
         loop {
-            let world = self.app.world_mut();
-            let impacts = to_be_painted(world);
-            let stats = world.resource::<SplatStats>();
-            if stats.splats() + stats.dropped() + self.painted_before >= impacts {
-                // The frame that painted them is done: `step` waits for the GPU.
+            let waiting = self.waiting();
+            if waiting == 0 {
+                // The frame that painted the last is done: `step` waits for the GPU.
                 return Ok(());
+            }
+            if waiting < least {
+                (begun, least) = (Instant::now(), waiting);
             }
             self.step(0)?;
             give_up_after(begun, "the last splats to be painted")?;

@@ -36,9 +36,11 @@ use bevy::time::TimeUpdateStrategy;
 
 use crate::clock::WeatheringClock;
 use crate::output::remove_temporaries;
+use crate::overlay::{SplatBudget, SplatStats};
 use crate::picture::PictureError;
 use crate::save::{ColorMaps, SaveError, SavedScene};
 use crate::scenario::{LoadedScenario, ScenarioError, ScenarioPlugin, ScenarioStatus, captures};
+use crate::schedule::TickHold;
 
 pub(crate) use app::headless;
 pub use app::{require_adapter, task_pools};
@@ -74,6 +76,9 @@ pub struct ReplayOptions {
     pub resume: Option<PathBuf>,
     /// Folder to save the scene into at the end. Of its own: neither `out` nor one that holds it.
     pub save: Option<PathBuf>,
+    /// What a frame may paint. Where it is not enough for the ticks of a frame, there are more frames: pictures and maps show
+    /// all, whatever it is.
+    pub splats: SplatBudget,
     /// Seconds of weather time between two rows of the series, at least a tick; without, one, or more if a run is so long
     /// that the rows would be too many.
     pub every: Option<f32>,
@@ -102,6 +107,7 @@ impl ReplayOptions {
             render: true,
             resume: None,
             save: None,
+            splats: SplatBudget::LARGEST,
             every: None,
             video: false,
             sheet: None,
@@ -225,15 +231,14 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
         pictures.sort_by_key(|(due, _)| *due);
     }
     for (due, file) in pictures {
-        run.capture(file)?;
-        run.step(due - tick)?;
+        run.picture(file, due - tick)?;
         tick = due;
         progress(Progress { tick, ticks });
     }
     while tick < ticks {
         // Without pictures: a quarter of a second at a time, so that progress can be told.
         let step = (clock.hz() / 4).clamp(1, ticks - tick);
-        run.step(step)?;
+        run.advance(step)?;
         tick += step;
         progress(Progress { tick, ticks });
     }
@@ -250,6 +255,8 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
         run_seconds: simulated.as_secs_f64(),
         total_seconds: begun.elapsed().as_secs_f64(),
         frames: frames.len() as u32,
+        carried_splats: run.app.world().get_resource::<SplatStats>().map_or(0, SplatStats::carried),
+        held_ticks: run.app.world().resource::<TickHold>().ticks,
     };
     let report = report::report(run.app.world_mut(), options, &maps, timing);
     if let Some(out) = &options.out {
@@ -345,8 +352,6 @@ struct Run<'a> {
     options: &'a ReplayOptions,
     app: App,
     target: Option<Handle<Image>>,
-    /// Impacts whose splats were painted before the scene was saved.
-    painted_before: u64,
 }
 
 impl<'a> Run<'a> {
@@ -359,7 +364,7 @@ impl<'a> Run<'a> {
         scenario.seed = options.seed;
         let mut app = app::build(options, scenario);
         let target = options.render.then(|| capture::add_target(app.world_mut(), options.size));
-        let mut run = Self { options, app, target, painted_before: 0 };
+        let mut run = Self { options, app, target };
         let begun = Instant::now();
         loop {
             run.step(0)?;
@@ -386,11 +391,45 @@ impl<'a> Run<'a> {
     /// Puts a saved scene in place of the fresh one.
     fn resume(&mut self, saved: &SavedScene, folder: &Path) -> Result<(), ReplayError> {
         saved.restore(self.app.world_mut(), &self.options.scenario, folder)?;
-        self.painted_before = maps::to_be_painted(self.app.world_mut());
         for _ in 0..3 {
             self.step(0)?;
         }
         Ok(())
+    }
+
+    fn tick(&self) -> u32 {
+        self.app.world().resource::<WeatheringClock>().tick()
+    }
+
+    /// A frame of `ticks` ticks, and its picture. If not all of it could be painted in one frame, the picture is taken once more
+    /// when it is, in place of the first.
+    fn picture(&mut self, file: String, ticks: u32) -> Result<(), ReplayError> {
+        self.capture(file.clone())?;
+        if !self.advance(ticks)? && self.options.out.is_some() {
+            self.finish_captures()?;
+            self.finish_painting()?;
+            self.capture(file)?;
+            self.step(0)?;
+        }
+        Ok(())
+    }
+
+    /// So many ticks, in one frame, or in more where ticks are held until what waits is painted. Returns whether one frame did
+    /// and painted all.
+    fn advance(&mut self, ticks: u32) -> Result<bool, ReplayError> {
+        let end = self.tick() + ticks;
+        self.step(ticks)?;
+        let whole = self.tick() == end && self.waiting() == 0;
+        let (mut begun, mut tick) = (Instant::now(), self.tick());
+        while tick < end {
+            self.finish_painting()?;
+            self.step(end - tick)?;
+            if self.tick() > tick {
+                (begun, tick) = (Instant::now(), self.tick());
+            }
+            give_up_after(begun, "time to go on")?;
+        }
+        Ok(whole)
     }
 
     /// One frame that holds `ticks` ticks.

@@ -7,7 +7,7 @@ use super::{ReplayOptions, SurfaceMaps};
 use crate::clock::WeatheringClock;
 use crate::collision::ColliderReport;
 use crate::effect::EffectTable;
-use crate::emitter::{EmissionSeed, NewParticles};
+use crate::emitter::{EmissionSeed, EmitterState, NewParticles};
 use crate::matter::SurfaceMatter;
 use crate::overlay::{MapLoss, MapPool, SurfaceTotals};
 use crate::particle::{Particle, ParticleCounts, Particles, WaterCounts};
@@ -56,8 +56,10 @@ pub struct ParticleReport {
     pub hit: u64,
     /// Ran out of time.
     pub expired: u64,
-    /// Not spawned, for want of room; not part of `emitted`.
+    /// Not spawned, for want of room; not part of `emitted`. What they would carry is missing.
     pub refused: u64,
+    /// The same of emitters with a flow; others carry what they would.
+    pub merged: u64,
 }
 
 /// One surface.
@@ -129,6 +131,8 @@ pub struct WaterReport {
     pub missed_mm3: f64,
     /// Still in flight.
     pub in_flight_mm3: f64,
+    /// Not sent out yet, since a limit left no particle to take it along; no part of the sum.
+    pub held_mm3: f64,
     /// Lost with maps that were taken away or for want of maps.
     pub evicted_mm3: f64,
     /// What the sum differs by, in parts of what came.
@@ -157,6 +161,10 @@ pub struct Timing {
     pub total_seconds: f64,
     /// Pictures drawn, without those of the run that this one goes on with.
     pub frames: u32,
+    /// Splats that were painted in a later frame than that of their ticks, for want of [budget](ReplayOptions::splats).
+    pub carried_splats: u64,
+    /// Ticks that had to wait until what was there was painted.
+    pub held_ticks: u64,
 }
 
 impl Report {
@@ -226,6 +234,7 @@ pub(super) fn report(
             hit: counts.hit,
             expired: counts.expired,
             refused: counts.refused,
+            merged: counts.merged,
         },
         water,
         work: WorkReport {
@@ -260,6 +269,10 @@ impl SurfaceMaps {
 /// Adds up all water, wherever it is.
 pub(super) fn water_report(world: &World, maps: &[SurfaceAccounts]) -> WaterReport {
     let nl = |nl: u64| nl as f64 / 1000.0;
+    // There is no such query in a world that has never seen an emitter.
+    let held_mm3 = world
+        .try_query::<&EmitterState>()
+        .map_or(0.0, |mut emitters| emitters.iter(world).map(EmitterState::held_mm3).sum::<f64>() + 0.0);
     let sum = |of: &dyn Fn(&SurfaceAccounts) -> u64| -> f64 {
         maps.iter().map(|maps| maps.water.units().mm3(of(maps))).sum::<f64>() + 0.0
     };
@@ -290,6 +303,7 @@ pub(super) fn water_report(world: &World, maps: &[SurfaceAccounts]) -> WaterRepo
         wiped_mm3: sum(&|maps| maps.water.ledger().wiped) + lost(&|loss| loss.wiped),
         missed_mm3: nl(expired(false)),
         in_flight_mm3: nl(in_flight),
+        held_mm3,
         evicted_mm3: lost(&|loss| loss.water),
         imbalance: 0.0,
     };

@@ -229,7 +229,7 @@ fn row(world: &mut World, time: [f64; 2]) -> Vec<f64> {
 }
 
 fn of_particles(counts: &ParticleCounts) -> [f64; 5] {
-    let ParticleCounts { emitted, alive, hit, expired, refused } = *counts;
+    let ParticleCounts { emitted, alive, hit, expired, refused, .. } = *counts;
     [alive, emitted, hit, expired, refused].map(|count| count as f64)
 }
 

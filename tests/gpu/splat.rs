@@ -5,7 +5,8 @@ use bevy::render::gpu_readback::Readback;
 use bevy_weathering::collision::MeshTriangles;
 use bevy_weathering::effect::StampSource;
 use bevy_weathering::overlay::{
-    CpuMaps, Overlays, RainRing, Splat, SplatQueue, SplatStats, StampAtlas, SurfaceFrames, Weatherable, Wrap,
+    CpuMaps, Overlays, RainRing, Splat, SplatBudget, SplatQueue, SplatStats, StampAtlas, SurfaceFrames,
+    Weatherable, Wrap,
 };
 
 use bevy_weathering::stamps::StampKind;
@@ -248,4 +249,44 @@ fn a_map_at_rest_costs_no_dispatch() {
         update(&mut app);
     }
     assert_eq!((stats.dispatches(), stats.splats()), (1, 5));
+}
+
+#[test]
+fn what_is_beyond_the_budget_is_painted_in_the_next_frames_and_in_order() {
+    let Some(mut app) = app() else { return };
+    let surface = Weatherable { map_size: SIZE, ..default() };
+    let mut references = [(); 2].map(|()| (spawn_surface(&mut app, surface), CpuMaps::new(&surface)));
+    let stats = app.world().resource::<SplatStats>().clone();
+    let mut all = 0;
+    // The first waits for the pipeline. Of 112 bytes each, 27 begin within 3,000.
+    for (budget, most) in [
+        (SplatBudget::default(), 1000),
+        (SplatBudget { per_frame: 50, ..default() }, 50),
+        (SplatBudget { upload_bytes: 3000, ..default() }, 27),
+    ] {
+        app.insert_resource(budget);
+        let carried = stats.carried();
+        for ((entity, reference), count) in references.iter_mut().zip([400, 30]) {
+            let splats = random_splats(count, all);
+            push(&mut app, *entity, &splats);
+            reference.paint(&splats, &StampAtlas::default(), None);
+            all += u64::from(count);
+        }
+        let mut before = stats.splats();
+        update_until(&mut app, "the splats to be painted", |_| {
+            let painted = stats.splats() - before;
+            assert!(painted <= most, "{painted} in a frame with {budget:?}");
+            before = stats.splats();
+            before >= all
+        });
+        assert_eq!((stats.splats(), stats.pending()), (all, 0));
+        let is_cut = most < 430;
+        assert_eq!(stats.carried() > carried, is_cut);
+        // Each waits once, and all but those of the first frame do.
+        assert!(stats.carried() - carried <= 430 && (!is_cut || stats.carried() - carried >= 430 - most));
+    }
+    for (entity, reference) in &references {
+        let maps = maps_of(&mut app, *entity, &surface);
+        assert!(maps == *reference);
+    }
 }

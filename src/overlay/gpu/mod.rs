@@ -2,14 +2,17 @@
 //!
 //! Main world: every surface gets textures and buffers ([`Overlays`]), of full size once something is to be painted. Extract
 //! moves the waiting splats over (each exactly once, however many ticks the frame held). Prepare sorts them into tiles and
-//! uploads them; until the pipeline and the maps exist, they wait. The pass dispatches one workgroup per touched tile: a
-//! surface without new splats costs nothing, which [`SplatStats`] shows. Then the touched tiles are halved into the mip maps of
-//! the colour maps (`mips.rs`).
+//! uploads them; until the pipeline and the maps exist, they wait, and so does what is beyond the frame's [`SplatBudget`]. The
+//! pass dispatches one workgroup per touched tile: a surface without new splats costs nothing, which [`SplatStats`] shows. Then
+//! the touched tiles are halved into the mip maps of the colour maps (`mips.rs`).
 
+mod backlog;
+mod hold;
 mod maps;
 mod mips;
 mod pass;
 mod prepare;
+mod stats;
 
 use bevy::asset::embedded_asset;
 use bevy::core_pipeline::schedule::camera_driver;
@@ -18,12 +21,14 @@ use bevy::render::renderer::RenderGraph;
 use bevy::render::{ExtractSchedule, Render, RenderApp, RenderStartup, RenderSystems};
 use bevy::shader::load_shader_library;
 
-use super::deposit::note_traces;
-use super::{SizeMaps, SplatQueue};
+use super::deposit::{deposit_splats, note_traces};
+use super::{SizeMaps, SplatBudget, SplatQueue};
+use crate::schedule::{TickHold, WeatheringSystems, WeatheringTick};
 
 pub use maps::Overlays;
 pub use mips::MipStep;
-pub use prepare::{SplatStats, SurfaceBatch};
+pub use prepare::SurfaceBatch;
+pub use stats::SplatStats;
 
 /// Paints splats with a compute pass. Needs a render app; without one it throws splats away. To keep what falls there,
 /// put [`CpuOverlayPlugin`](super::CpuOverlayPlugin) in its place.
@@ -41,11 +46,25 @@ impl Plugin for GpuOverlayPlugin {
         embedded_asset!(app, "../../../shaders/mips.wgsl");
 
         let stats = SplatStats::default();
-        app.insert_resource(stats.clone()).add_observer(maps::release_overlays).add_systems(
-            PreUpdate,
-            // Of maps whose size has been decided; what has waited since the last tick gets its room at once.
-            (maps::add_overlays, maps::open_overlays).chain().after(SizeMaps),
-        );
+        app.insert_resource(stats.clone())
+            .register_type::<SplatBudget>()
+            .init_resource::<SplatBudget>()
+            .init_resource::<TickHold>()
+            .add_observer(maps::release_overlays)
+            .add_systems(
+                PreUpdate,
+                (
+                    // Of maps whose size has been decided; what has waited since the last tick gets its room at once.
+                    (maps::add_overlays, maps::open_overlays).chain().after(SizeMaps),
+                    // What is taken away with its maps waits no more.
+                    hold::hold_ticks.after(SizeMaps),
+                ),
+            )
+            .add_systems(
+                WeatheringTick,
+                // Counts what this tick has put down.
+                hold::hold_ticks.after(deposit_splats).in_set(WeatheringSystems::Deposit),
+            );
 
         let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
         render_app

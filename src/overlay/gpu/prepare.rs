@@ -1,7 +1,6 @@
 //! Splats on their way from the main world to the GPU.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use bevy::ecs::entity::EntityHashMap;
 use bevy::prelude::*;
@@ -15,11 +14,13 @@ use bevy::render::storage::{GpuShaderBuffer, ShaderBuffer};
 use bevy::render::texture::GpuImage;
 use bevy::render::{Extract, MainWorld};
 
+use super::SplatStats;
+use super::backlog::Backlog;
 use super::maps::Overlays;
 use super::mips::{MipBatches, MipPipeline, SurfaceLevels};
 use super::pass::SplatPipeline;
 use crate::overlay::{
-    Lying, Splat, SplatQueue, StampAtlas, SurfaceFrames, TexelFrame, TileBins, TileHeader, Wrap,
+    Lying, Splat, SplatBudget, SplatQueue, StampAtlas, SurfaceFrames, TexelFrame, TileBins, TileHeader, Wrap,
 };
 
 /// What the pass needs to know about one surface. `SurfaceBatch` in `shaders/splat.wgsl` has the same fields.
@@ -33,55 +34,21 @@ pub struct SurfaceBatch {
     pub clamped: UVec2,
 }
 
-/// What the pass has done since the start; the same numbers in the main and in the render world.
-#[derive(Resource, Clone, Default)]
-pub struct SplatStats(Arc<Counters>);
-
-#[derive(Default)]
-struct Counters {
-    splats: AtomicU64,
-    dispatches: AtomicU64,
-    tiles: AtomicU64,
-    dropped: AtomicU64,
-}
-
-impl SplatStats {
-    /// Splats painted.
-    pub fn splats(&self) -> u64 {
-        self.0.splats.load(Ordering::Relaxed)
-    }
-
-    /// Dispatches: one per surface and frame with new splats.
-    pub fn dispatches(&self) -> u64 {
-        self.0.dispatches.load(Ordering::Relaxed)
-    }
-
-    /// Tiles visited.
-    pub fn tiles(&self) -> u64 {
-        self.0.tiles.load(Ordering::Relaxed)
-    }
-
-    /// Splats that were dropped with the maps they were meant for.
-    pub fn dropped(&self) -> u64 {
-        self.0.dropped.load(Ordering::Relaxed)
-    }
-
-    fn drop_splats(&self, splats: usize) {
-        self.0.dropped.fetch_add(splats as u64, Ordering::Relaxed);
-    }
-
-    fn add(&self, splats: usize, tiles: usize) {
-        self.0.splats.fetch_add(splats as u64, Ordering::Relaxed);
-        self.0.tiles.fetch_add(tiles as u64, Ordering::Relaxed);
-        self.0.dispatches.fetch_add(1, Ordering::Relaxed);
-    }
-}
-
 /// Splats in the render world that are not painted yet, by surface.
 #[derive(Resource, Default)]
 pub(super) struct PendingSplats {
     surfaces: Vec<PendingSurface>,
     by_entity: EntityHashMap<usize>,
+    budget: SplatBudget,
+    /// The surface whose turn it is first.
+    first: usize,
+}
+
+impl PendingSplats {
+    /// How many wait, on all surfaces.
+    fn len(&self) -> usize {
+        self.surfaces.iter().map(|surface| surface.backlog.len()).sum()
+    }
 }
 
 struct PendingSurface {
@@ -93,7 +60,7 @@ struct PendingSurface {
     lying: Option<Buffer>,
     /// While the maps stay.
     levels: Option<SurfaceLevels>,
-    splats: Vec<Splat>,
+    backlog: Backlog,
 }
 
 /// [`Overlays`] by name, so that nothing here keeps the maps of a surface that has gone or got others.
@@ -128,13 +95,22 @@ pub(super) fn extract_splats(
     >,
 ) {
     let query = query.get_or_insert_with(|| main_world.query());
-    let PendingSplats { surfaces, by_entity } = &mut *pending;
+    pending.budget = main_world.get_resource::<SplatBudget>().copied().unwrap_or_default();
+    let PendingSplats { surfaces, by_entity, .. } = &mut *pending;
     for (entity, overlays, mut queue, frames) in query.iter_mut(&mut main_world) {
-        // Levels hold on to their textures, also those that a surface has no more.
-        if let Some(&index) = by_entity.get(&entity)
-            && surfaces[index].maps.images != Maps::from(overlays).images
-        {
-            surfaces[index].levels = None;
+        if let Some(&index) = by_entity.get(&entity) {
+            let waiting = &mut surfaces[index];
+            let maps = Maps::from(overlays);
+            if waiting.maps.images != maps.images {
+                // Levels hold on to their textures, also those that a surface has no more.
+                waiting.levels = None;
+            }
+            if waiting.maps.rings != maps.rings {
+                // New maps: what was meant for the old ones is gone with them.
+                stats.drop_splats(waiting.backlog.len());
+                waiting.backlog.clear();
+            }
+            waiting.maps = maps;
         }
         // Splats for which there is no room yet wait where they are.
         if queue.is_empty() || !overlays.has_colors {
@@ -149,23 +125,17 @@ pub(super) fn extract_splats(
                 frame_buffer: None,
                 lying: None,
                 levels: None,
-                splats: Vec::new(),
+                backlog: Backlog::default(),
             });
             surfaces.len() - 1
         });
         let waiting = &mut surfaces[index];
-        if waiting.maps.rings != overlays.rings.id() {
-            // New maps: what was meant for the old ones is gone with them.
-            stats.drop_splats(waiting.splats.len());
-            waiting.splats.clear();
-        }
-        waiting.maps = overlays.into();
         let place = |frames: &SurfaceFrames| Arc::as_ptr(&frames.0);
         if waiting.frames.as_ref().map(place) != frames.map(place) {
             (waiting.frames, waiting.frame_buffer, waiting.lying) = (frames.cloned(), None, None);
             waiting.levels = None;
         }
-        queue.drain_into(&mut waiting.splats);
+        waiting.backlog.take_from(&mut queue);
     }
     // Despawned, or without maps; what is kept here for it goes, too.
     let gone = |waiting: &PendingSurface| main_world.get::<Overlays>(waiting.entity).is_none();
@@ -173,13 +143,14 @@ pub(super) fn extract_splats(
         surfaces.retain(|waiting| {
             let gone = gone(waiting);
             if gone {
-                stats.drop_splats(waiting.splats.len());
+                stats.drop_splats(waiting.backlog.len());
             }
             !gone
         });
         by_entity.clear();
         by_entity.extend(surfaces.iter().enumerate().map(|(index, waiting)| (waiting.entity, index)));
     }
+    stats.set_pending(pending.len());
 }
 
 /// The stamps on the GPU.
@@ -249,7 +220,8 @@ impl Default for SplatBatches {
     }
 }
 
-/// Sorts what is pending into tiles and uploads it.
+/// Sorts what is pending into tiles and uploads it, as much as the budget allows. Surfaces share no texel, so only the order within
+/// each matters. The one that the budget cut has its turn last in the next frame: none waits for ever.
 pub(super) fn prepare_splats(
     mut pending: ResMut<PendingSplats>,
     mut batches: ResMut<SplatBatches>,
@@ -267,7 +239,7 @@ pub(super) fn prepare_splats(
     let SplatBatches { batches, splats, tiles, list, bins, no_frames, no_mask, frame, jobs } = &mut *batches;
     jobs.clear();
     mips.clear();
-    if pending.surfaces.iter().all(|surface| surface.splats.is_empty())
+    if pending.len() == 0
         || cache.get_compute_pipeline(pipeline.pipeline).is_none()
         || cache.get_compute_pipeline(mip_pipeline.pipeline).is_none()
     {
@@ -277,18 +249,36 @@ pub(super) fn prepare_splats(
     splats.clear();
     tiles.clear();
     list.clear();
-    for waiting in pending.surfaces.iter_mut().filter(|surface| !surface.splats.is_empty()) {
+    let (mut room, mut bytes) = pending.budget.of_a_frame();
+    let PendingSplats { surfaces, first, .. } = &mut *pending;
+    let count = surfaces.len();
+    let begin = *first % count;
+    let mut next = None;
+    for index in (begin..count).chain(0..begin) {
+        let waiting = &mut surfaces[index];
+        if waiting.backlog.is_empty() {
+            continue;
+        }
         let Maps { size, wrap, images: [diffuse, specular, normal], rings } = waiting.maps;
         let (Some(diffuse), Some(specular), Some(normal), Some(rings)) =
             (images.get(diffuse), images.get(specular), images.get(normal), buffers.get(rings))
         else {
             continue;
         };
+        if room == 0 || bytes == 0 {
+            stats.carry(waiting.backlog.finish(0));
+            continue;
+        }
         let first_tile = tiles.len() as u32;
         let first_splat = splats.len() as u32;
+        let first_entry = list.len();
         let frames = waiting.frames.as_ref();
-        bins.bin(&waiting.splats, size, wrap, frames, first_splat, tiles.values_mut(), list.values_mut());
-        let in_space = waiting.splats.iter().any(|splat| splat.in_space != 0);
+        let batch = waiting.backlog.waiting();
+        let batch = &batch[..batch.len().min(room)];
+        let (headers, entries) = (tiles.values_mut(), list.values_mut());
+        let taken = bins.bin_within(bytes, batch, size, wrap, frames, first_splat, headers, entries);
+        let batch = &batch[..taken];
+        let in_space = batch.iter().any(|splat| splat.in_space != 0);
         if in_space
             && waiting.frame_buffer.is_none()
             && let Some(frames) = frames
@@ -307,7 +297,7 @@ pub(super) fn prepare_splats(
             let lying = waiting.lying.as_ref().unwrap_or(no_mask);
             SurfaceLevels::new(maps, lying, masked, &mip_pipeline, &cache, &device)
         }));
-        splats.values_mut().extend_from_slice(&waiting.splats);
+        splats.values_mut().extend_from_slice(batch);
         let touched = tiles.len() as u32 - first_tile;
         mips.add(levels, size, &tiles.values()[first_tile as usize..]);
         let clamped = UVec2::from_array(wrap.map(|wrap| u32::from(wrap == Wrap::Clamp)));
@@ -326,9 +316,16 @@ pub(super) fn prepare_splats(
             batch_offset: batches.push(&SurfaceBatch { size, first_tile, clamped }),
             tiles: touched,
         });
-        stats.add(waiting.splats.len(), touched as usize);
-        waiting.splats.clear();
+        stats.add(taken, touched as usize);
+        room -= taken;
+        bytes = bytes.saturating_sub(TileBins::bytes(taken, touched as usize, list.len() - first_entry));
+        stats.carry(waiting.backlog.finish(taken));
+        if !waiting.backlog.is_empty() {
+            next = next.or(Some(index + 1));
+        }
     }
+    *first = next.unwrap_or(begin);
+    stats.set_pending(pending.len());
     batches.write_buffer(&device, &queue);
     splats.write_buffer(&device, &queue);
     tiles.write_buffer(&device, &queue);
@@ -386,7 +383,7 @@ mod tests {
 
     fn pending(render: &World) -> Vec<u32> {
         let surfaces = &render.resource::<PendingSplats>().surfaces;
-        surfaces.iter().flat_map(|surface| &surface.splats).map(|splat| splat.tick).collect()
+        surfaces.iter().flat_map(|surface| surface.backlog.waiting()).map(|splat| splat.tick).collect()
     }
 
     #[test]
@@ -402,6 +399,7 @@ mod tests {
         }
         // Nothing was painted: all of it still waits, in order.
         assert_eq!(pending(&render), [0, 1, 2, 3, 4, 5, 6]);
+        assert_eq!(render.resource::<SplatStats>().pending(), 7);
     }
 
     #[test]
@@ -417,6 +415,12 @@ mod tests {
         schedule.run(&mut render);
         assert_eq!(pending(&render), [3]);
         assert_eq!(render.resource::<SplatStats>().dropped(), 3);
+        // Also if nothing new comes: it could never be painted.
+        let other = Handle::Uuid(bevy::asset::uuid::Uuid::from_u128(8), std::marker::PhantomData);
+        render.resource_mut::<MainWorld>().get_mut::<Overlays>(surface).unwrap().rings = other;
+        schedule.run(&mut render);
+        let stats = render.resource::<SplatStats>();
+        assert_eq!((pending(&render), stats.pending(), stats.dropped()), (vec![], 0, 4));
     }
 
     #[test]

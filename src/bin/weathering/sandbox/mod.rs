@@ -38,6 +38,7 @@ use bevy::render::renderer::RenderAdapterInfo;
 use bevy::window::PrimaryWindow;
 use bevy_weathering::WeatheringPlugins;
 use bevy_weathering::effect::{EffectTable, WeatherEffect};
+use bevy_weathering::overload::{LiveBudget, LiveBudgetPlugin};
 use bevy_weathering::replay::{require_adapter, task_pools};
 use bevy_weathering::scenario::{AssetTree, ScenarioPlugin};
 
@@ -66,6 +67,9 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
             }),
     )
     .add_plugins(WeatheringPlugins)
+    // As long as the pace lets ticks take; what is left to do here is fewer particles.
+    .insert_resource(LiveBudget { frame_ms: pace::BUDGET as f32 * 1000.0, ..default() })
+    .add_plugins(LiveBudgetPlugin)
     .insert_resource(AssetTree(loaded.tree.clone()))
     .add_plugins(scenario);
     let is_model = model::is_model(&arguments.file);

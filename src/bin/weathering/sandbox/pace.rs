@@ -18,7 +18,7 @@ use super::ui::{AddPanel, Note, Place, keyboard_is_free};
 /// Slowest and fastest.
 const SPEEDS: (f64, f64) = (0.1, 100.0);
 /// Seconds of ticks in a frame.
-const BUDGET: f64 = 0.1;
+pub const BUDGET: f64 = 0.1;
 /// What virtual time follows of a frame, at most, seconds; Bevy's default.
 const LONGEST_FRAME: f64 = 0.25;
 
