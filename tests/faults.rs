@@ -86,6 +86,8 @@ fn assert_whole(folder: &Path) {
                 assert!(report.is_ok(), "{name}: {report:?}");
             }
             Some("ron") => {}
+            Some("svg") => assert!(fs::read_to_string(&path).unwrap().ends_with("</svg>\n"), "{name}"),
+            Some("csv") => assert!(fs::read_to_string(&path).unwrap().ends_with('\n'), "{name}"),
             _ => panic!("{name} is none of ours"),
         }
     }

@@ -62,8 +62,8 @@ fn drizzle(scene: &mut Scene, rate: f32, half_size: Vec2, at: Vec3) {
     let shape = EmitterShape::Sky { half_size };
     let emitter = Emitter { rate, shape, speed: 6.0, lifetime: 2.0, ..default() };
     let sky = scene.emit(emitter, 0.5, 0.03, at + Vec3::Y);
-    // It has a place in the world from the next frame on.
-    scene.0.update();
+    // It has a place in the world and an effect from the next frame on.
+    scene.run(1);
     scene.run(HZ / 2);
     scene.0.world_mut().entity_mut(sky).despawn();
     scene.run(HZ / 2);

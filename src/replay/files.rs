@@ -9,7 +9,7 @@ use super::plots::{PLOT_FILES, PLOTS_FOLDER};
 use super::series::{SERIES_FILE, TIMINGS_FILE};
 use super::sheet::SHEET_FILE;
 use super::video::{ANIMATION_FILE, VIDEO_FILE};
-use crate::output::{self, temporary_beside};
+use crate::output::{self, remove_temporaries, temporary_beside};
 
 /// Writes under a temporary name beside `path` and renames; makes missing folders. On an error nothing is left.
 ///
@@ -83,9 +83,7 @@ pub(super) fn remove_earlier_outputs(folder: &Path) -> Result<(), ReplayError> {
     let plots = folder.join(PLOTS_FOLDER);
     let files = made.map(|file| folder.join(file)).into_iter().chain(PLOT_FILES.map(|file| plots.join(file)));
     let maps = folder.join("maps");
-    let folders: [&Path; 3] = [folder, &maps, &plots];
-    let half_written = folders.into_iter().flat_map(temporaries);
-    for path in files.chain(half_written) {
+    for path in files {
         match fs::remove_file(&path) {
             Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
                 return Err(ReplayError::Write { path, source });
@@ -93,17 +91,10 @@ pub(super) fn remove_earlier_outputs(folder: &Path) -> Result<(), ReplayError> {
             _ => {}
         }
     }
+    for folder in [folder, &maps, &plots] {
+        remove_temporaries(folder).map_err(|source| ReplayError::Write { path: folder.into(), source })?;
+    }
     Ok(())
-}
-
-/// What [`write_atomic`] leaves in a folder if it is killed.
-fn temporaries(folder: &Path) -> Vec<PathBuf> {
-    let is_temporary = |name: &str| name.len() == 11 && name.starts_with('.') && name.ends_with(".tmp");
-    let entries = fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
-    entries
-        .filter(|entry| entry.file_name().to_str().is_some_and(is_temporary))
-        .map(|entry| entry.path())
-        .collect()
 }
 
 /// The numbers and files of all pictures in a folder, in order.
@@ -124,8 +115,13 @@ mod tests {
     fn what_was_made_of_an_earlier_run_is_removed_and_nothing_else() {
         let folder = tempfile::tempdir().unwrap();
         let made = ["done.json", "series.csv", "timings.csv", "video.mp4", "video.apng", "sheet.png"];
-        let below = ["plots/film.svg", ".a1B2c3.tmp", "maps/.ABCDEF.tmp", "plots/.123456.tmp"];
-        let others = ["my.csv", "plots/mine.svg", ".tmp", ".swap.file.tmp", "frame_00000.png"];
+        let below = [
+            "plots/film.svg",
+            ".weathering-a1B2c3.tmp",
+            "maps/.weathering-ABCDEF.tmp",
+            "plots/.weathering-123456.tmp",
+        ];
+        let others = ["my.csv", "plots/mine.svg", ".tmp", ".a1B2c3.tmp", "frame_00000.png"];
         for name in made.iter().chain(&below).chain(&others) {
             write_atomic(&folder.path().join(name), b"x").unwrap();
         }
@@ -133,9 +129,6 @@ mod tests {
         assert!(made.iter().chain(&below).all(|name| !folder.path().join(name).exists()));
         assert!(others.iter().all(|name| folder.path().join(name).exists()));
         remove_earlier_outputs(&folder.path().join("nowhere")).unwrap();
-        // A temporary file is recognised as one.
-        let temporary = temporary_beside(&folder.path().join("a.png")).unwrap();
-        assert_eq!(temporaries(folder.path()), [temporary.path()]);
     }
 
     #[test]

@@ -35,7 +35,6 @@ use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 
 use crate::clock::WeatheringClock;
-use crate::output::remove_temporaries;
 use crate::overlay::{SplatBudget, SplatStats};
 use crate::picture::PictureError;
 use crate::save::{ColorMaps, SaveError, SavedScene};
@@ -213,9 +212,6 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
         files::require_writable(out)?;
         earlier = options.resume.is_some().then(|| SeriesTables::read(out));
         files::remove_earlier_outputs(out)?;
-        for folder in [out.clone(), out.join("maps")] {
-            remove_temporaries(&folder).map_err(|source| ReplayError::Write { path: folder, source })?;
-        }
         let taken: Vec<_> = taken.iter().map(|(_, name)| files::capture_file(name)).collect();
         files::remove_earlier_run(out, frames.start, &taken)?;
         run.begin_series(every);

@@ -20,11 +20,28 @@ pub(super) fn check(json: &Value) -> Result<(), (String, String)> {
             return Err((list.into(), format!("there are {count}; at most {MAX_TEXTURES} are read")));
         }
     }
+    check_positions(json)?;
     let elements = read_elements(json);
     if elements > MAX_ELEMENTS {
         return Err(("accessors".into(), format!("{elements} elements; at most {MAX_ELEMENTS} are read")));
     }
     check_nodes(entries(&json["nodes"]))
+}
+
+/// The gltf crate, 1.4, panics where the positions of a primitive are an accessor that is not there.
+fn check_positions(json: &Value) -> Result<(), (String, String)> {
+    let count = entries(&json["accessors"]).len() as u64;
+    for (number, mesh) in entries(&json["meshes"]).iter().enumerate() {
+        for (part, primitive) in entries(&mesh["primitives"]).iter().enumerate() {
+            if let Some(index) = primitive["attributes"]["POSITION"].as_u64()
+                && index >= count
+            {
+                let field = format!("meshes[{number}].primitives[{part}].attributes.POSITION");
+                return Err((field, format!("is accessor {index} of {count}")));
+            }
+        }
+    }
+    Ok(())
 }
 
 fn entries(value: &Value) -> &[Value] {
@@ -116,6 +133,16 @@ mod tests {
         assert!(refusal(&shared).contains("200000000 elements"), "{}", refusal(&shared));
         let images = json!({ "images": vec![json!({}); 1025] });
         assert!(refusal(&images).starts_with("images"), "{}", refusal(&images));
+    }
+
+    #[test]
+    fn positions_that_are_not_there_are_told_before_anybody_asks_for_them() {
+        let of = |index: u64| {
+            let primitive = json!({ "attributes": { "POSITION": index } });
+            json!({ "accessors": [{}], "meshes": [{ "primitives": [primitive] }] })
+        };
+        assert_eq!(refusal(&of(0)), "");
+        assert!(refusal(&of(u64::from(u32::MAX))).starts_with("meshes[0].primitives[0].attributes.POSITION"));
     }
 
     #[test]

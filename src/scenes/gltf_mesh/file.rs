@@ -44,6 +44,15 @@ impl<'a> GltfFile<'a> {
         if bytes.starts_with(b"glTF") && claimed < 12 {
             return Err(parse("it is shorter than its header".into()));
         }
+        // Its checks panic, in version 1.4, where positions are an accessor that is not there.
+        let unchecked = gltf::Gltf::from_slice_without_validation(&bytes);
+        let unchecked = unchecked.map_err(|error| parse(error.to_string()))?;
+        let json = unchecked.document.as_json();
+        let mut primitives = json.meshes.iter().flat_map(|mesh| &mesh.primitives);
+        if primitives.any(|part| part.attributes.values().any(|index| index.value() >= json.accessors.len()))
+        {
+            return Err(parse("a primitive has an accessor that is not there".into()));
+        }
         let mut gltf = gltf::Gltf::from_slice(&bytes).map_err(|error| parse(error.to_string()))?;
         let mut binary_chunk = gltf.blob.take();
         let mut buffers = Vec::new();
