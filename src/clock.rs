@@ -112,7 +112,7 @@ impl Default for ClockPlugin {
 impl Plugin for ClockPlugin {
     fn build(&self, app: &mut App) {
         self.insert_clock(app.world_mut());
-        app.register_type::<ShownTime>().init_resource::<ShownTime>();
+        app.register_type::<WeatheringClock>().register_type::<ShownTime>().init_resource::<ShownTime>();
         // Every stage of a tick sees its number.
         app.add_systems(WeatheringTick, advance_clock.before(WeatheringSystems::First));
     }

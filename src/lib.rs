@@ -32,13 +32,16 @@ use bevy::prelude::*;
 /// What a Bevy app needs to get things wet.
 pub mod prelude {
     pub use crate::WeatheringPlugins;
-    pub use crate::brush::{Brush, BrushKind, BrushQueue};
-    pub use crate::clock::WeatheringClock;
+    pub use crate::brush::{Brush, BrushKind, BrushQueue, Stroke};
+    pub use crate::clock::{ShownTime, WeatheringClock};
     pub use crate::collision::{ReportImpacts, SurfaceImpact};
-    pub use crate::effect::WeatherEffect;
+    pub use crate::effect::{Carries, WeatherEffect};
     pub use crate::emitter::{Emitter, EmitterShape, Flow};
-    pub use crate::material::{PorousMaterial, StandingWater, WettingModel};
-    pub use crate::overlay::{MapBudget, OverlayUv, Weatherable, Wrap};
+    pub use crate::material::{
+        Flood, PlayedWetMap, PorousMaterial, StandingWater, WettingModel, WettingTextures,
+    };
+    pub use crate::matter::MatterLook;
+    pub use crate::overlay::{MapBudget, OverlayUv, StampSpace, Weatherable, Wrap};
     pub use crate::overload::{LiveBudget, LiveBudgetPlugin};
     pub use crate::particle::Forces;
     pub use crate::schedule::{WeatheringSystems, WeatheringTick};
@@ -93,4 +96,15 @@ impl PluginGroup for WeatheringPlugins {
             .add(particle::ParticleDrawPlugin)
             .add(material::PorousMaterialPlugin)
     }
+}
+
+/// The code in `docs/` compiles, too.
+#[cfg(doctest)]
+mod guide {
+    #[doc = include_str!("../docs/start.md")]
+    #[doc = include_str!("../docs/concepts.md")]
+    #[doc = include_str!("../docs/effects.md")]
+    #[doc = include_str!("../docs/materials.md")]
+    #[doc = include_str!("../docs/performance.md")]
+    struct Guide;
 }

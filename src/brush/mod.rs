@@ -91,7 +91,7 @@ impl Brush {
 }
 
 /// A brush and what it may touch.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Reflect, Debug, Clone, Copy, PartialEq)]
 pub struct Stroke {
     /// The touch.
     pub brush: Brush,

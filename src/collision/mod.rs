@@ -38,7 +38,7 @@ pub use triangles::{MeshTriangles, TriangleError, TriangleReport};
 pub use uvs::{AwaitsUvs, UvSet};
 
 /// A particle that hit a surface in this tick.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Reflect, Debug, Clone, Copy, PartialEq)]
 pub struct Impact {
     /// Number of the particle.
     pub sequence: Sequence,

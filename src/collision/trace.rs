@@ -16,7 +16,7 @@ const PARALLEL_BATCH: usize = 1024;
 pub struct ReportImpacts;
 
 /// A particle hit a surface that has [`ReportImpacts`].
-#[derive(Message, Debug, Clone, Copy, PartialEq)]
+#[derive(Message, Reflect, Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceImpact(pub Impact);
 
 /// Casts the segment each particle moved in this tick; what hits ends there and becomes an [`Impact`].

@@ -41,7 +41,7 @@ pub struct WeatherEffect {
     pub splash: f32,
     /// Multiplies gravity: 1 falls, 0 floats.
     pub gravity_scale: f32,
-    /// Shapes of the mark on the surface.
+    /// Shapes of the mark on the surface. An effect made in code has domes until [`Self::with_stamps`] was called.
     pub stamps: StampSource,
     /// Radius of the mark of a particle with `volume_mm3` or more, in metres; with less it is smaller, by (V/V₀)^(5/12), as drops of
     /// one speed spread. Not given: of a round patch as large as what its drops spread to ([`spread_mm`](drops::spread_mm)), all

@@ -11,8 +11,9 @@
 //!
 //! With porosity 0 or where nothing is wet, a surface looks as its `StandardMaterial` does.
 //!
-//! Not here: transmission, contact shadows, and screen-space reflections on weathered surfaces; deferred rendering
-//! draws them without wetness.
+//! They are drawn forward, also beside deferred surfaces: a G-buffer has no room for pores.
+//!
+//! Not here: rectangular lights, specular transmission, contact shadows and screen-space reflections on wet surfaces.
 
 mod clock;
 mod exchange;
@@ -59,7 +60,8 @@ impl Plugin for PorousMaterialPlugin {
         app.register_type::<PorousMaterial>()
             .register_type::<WettingTextures>()
             .register_type::<StandingWater>()
-            .register_type::<PlayedWetMap>();
+            .register_type::<PlayedWetMap>()
+            .register_type::<DryMaterial>();
         if app.get_sub_app(RenderApp).is_none() {
             return;
         }

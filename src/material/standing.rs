@@ -42,11 +42,11 @@ pub enum Flood {
     /// Nowhere.
     #[default]
     None,
-    /// Lagarde's accumulation, see [`accumulated`](super::film::flood::accumulated); levels in 0..=1.
+    /// Lagarde's accumulation, see [`accumulated`](super::film::flood::accumulated).
     Accumulation {
-        /// Fills low texels.
+        /// Fills low texels, 0..=1.
         cracks: f32,
-        /// Fills painted vertices, from the darkest.
+        /// Fills painted vertices, from the darkest, 0..=2; from 1.4 on all of them.
         puddles: f32,
     },
     /// True depth, see [`flood_depth`](super::film::flood::flood_depth); mm.

@@ -158,6 +158,8 @@ pub struct ParticlePlugin;
 impl Plugin for ParticlePlugin {
     fn build(&self, app: &mut App) {
         app.register_type::<Forces>()
+            .register_type::<ParticleConfig>()
+            .register_type::<ParticleCounts>()
             .init_resource::<Forces>()
             .init_resource::<Weather>()
             .init_resource::<ParticleConfig>()

@@ -11,7 +11,7 @@ use crate::overlay::Splat;
 use crate::weather::DryingClock;
 
 /// How wet a place is.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Reflect, Debug, Clone, Copy, PartialEq, Default)]
 pub struct Wetness {
     /// How wet it looks, 0..=1: 1 where a film lies.
     pub wetness: f32,
@@ -24,7 +24,7 @@ pub struct Wetness {
 }
 
 /// How wet a whole surface is.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Reflect, Debug, Clone, Copy, PartialEq, Default)]
 pub struct SurfaceWetness {
     /// Part of its area that looks wetter than a half, 0..=1.
     pub wet_fraction: f32,
@@ -202,7 +202,7 @@ impl Default for WatchWetness {
 }
 
 /// A surface with [`WatchWetness`] has become wet.
-#[derive(Message, Debug, Clone, Copy, PartialEq)]
+#[derive(Message, Reflect, Debug, Clone, Copy, PartialEq)]
 pub struct BecameWet {
     /// The surface.
     pub surface: Entity,
@@ -211,7 +211,7 @@ pub struct BecameWet {
 }
 
 /// A surface with [`WatchWetness`] has dried.
-#[derive(Message, Debug, Clone, Copy, PartialEq)]
+#[derive(Message, Reflect, Debug, Clone, Copy, PartialEq)]
 pub struct Dried {
     /// The surface.
     pub surface: Entity,

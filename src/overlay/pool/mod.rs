@@ -130,7 +130,7 @@ pub struct MapPool {
 }
 
 /// A surface has lost its maps to the budget.
-#[derive(Message, Debug, Clone, Copy, PartialEq)]
+#[derive(Message, Reflect, Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceEvicted {
     /// The surface.
     pub surface: Entity,
