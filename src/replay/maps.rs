@@ -133,9 +133,9 @@ impl Run<'_> {
             let material = material.unwrap_or(&default);
             let now = Now::new(clock.tick(), clock.hz(), &drying, &geometry.0, exposure, material);
             let mut read = SurfaceMaps::new(surface.name.clone(), size, water, matter, *loss, cpu, &now);
-            if cpu.is_none()
-                && let Some(gpu) = gpu.filter(|gpu| gpu.has_colors)
-            {
+            if cpu.is_some() {
+                // All of it is here already.
+            } else if let Some(gpu) = gpu.filter(|gpu| gpu.has_colors) {
                 requests.push((entity, 0, Readback::texture(gpu.diffuse.clone())));
                 requests.push((entity, 1, Readback::texture(gpu.specular.clone())));
                 requests.push((entity, 2, Readback::texture(gpu.normal.clone())));

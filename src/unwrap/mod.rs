@@ -4,7 +4,7 @@
 //! another. [`measure_overlap`] finds such meshes, [`unwrapped`] gives them a second set, [`Mesh::ATTRIBUTE_UV_1`], and
 //! leaves the first for textures.
 //!
-//! Each mesh of a surface that wants it ([`OverlayUv`](crate::overlay::OverlayUv)) is looked at in the background
+//! Each mesh of a surface that wants it ([`OverlayUv`]) is looked at in the background
 //! ([`unique_uvs`]). What has unique uvs keeps its mesh; what has none shows a copy of it that has, made once for each mesh and
 //! [`UnwrapOptions`] and shared by all surfaces that show it. [`UvSet`] tells which uvs colliders, and so maps and water, and
 //! the shader take. Until that is known a surface has no collider ([`AwaitsUvs`]). [`UnwrappedFrom`] remembers what it

@@ -62,7 +62,7 @@ fn splats_beyond_the_budget_of_a_frame_are_painted_later_to_the_same_maps() {
         let options = ReplayOptions {
             out: Some(out.path().to_owned()),
             fps: 6,
-            seconds: Some(0.5),
+            seconds: Some(0.8),
             size: UVec2::new(16, 16),
             splats,
             ..ReplayOptions::new(scenario.clone())
