@@ -38,6 +38,7 @@ use bevy::render::renderer::RenderAdapterInfo;
 use bevy::window::PrimaryWindow;
 use bevy_weathering::WeatheringPlugins;
 use bevy_weathering::effect::{EffectTable, WeatherEffect};
+use bevy_weathering::overlay::SplatBudget;
 use bevy_weathering::overload::{LiveBudget, LiveBudgetPlugin};
 use bevy_weathering::replay::{require_adapter, task_pools};
 use bevy_weathering::scenario::{AssetTree, ScenarioPlugin};
@@ -125,6 +126,8 @@ fn spare_software_renderers(
     if !*is_small {
         *is_small = true;
         commands.insert_resource(DirectionalLightShadowMap { size: 1024 });
+        // A splat takes such a driver some 50 µs (benches/NOTES.md, `overlap`); the others wait.
+        commands.insert_resource(SplatBudget { per_frame: 1000, ..default() });
         for mut window in &mut windows {
             window.resolution.set(960.0, 540.0);
         }
