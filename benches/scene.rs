@@ -132,13 +132,13 @@ pub fn water() -> WeatherEffect {
 }
 
 /// What comes out of the hose, litres a minute: a garden hose. The more particles, the smaller each.
-const HOSE_FLOW: f32 = 20.0;
+const HOSE_FLOW: Flow = Flow::LitresPerMinute(20.0);
 
 fn hose(effect: Handle<WeatherEffect>, rate: f32) -> (Emitter, Transform) {
     let emitter = Emitter {
         effect,
         rate,
-        flow: Flow::LitresPerMinute(HOSE_FLOW),
+        flow: HOSE_FLOW,
         shape: EmitterShape::Cone { radius: 0.008 },
         speed: 8.8,
         spread: 4.0_f32.to_radians(),

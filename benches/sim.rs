@@ -17,7 +17,7 @@ use bevy::time::TimeUpdateStrategy;
 use bevy_weathering::WeatheringPlugins;
 use bevy_weathering::collision::SurfaceCollider;
 use bevy_weathering::effect::{EffectIndex, EffectTable, WeatherEffect};
-use bevy_weathering::emitter::Emitter;
+use bevy_weathering::emitter::{Emitter, Flow};
 use bevy_weathering::overlay::{CpuOverlayPlugin, GpuOverlayPlugin, SplatQueue, TexelArea, Weatherable};
 use bevy_weathering::particle::{Particle, ParticleCounts, Particles};
 use bevy_weathering::replay::task_pools;
@@ -131,7 +131,11 @@ impl Sim {
 
         // Behind that, so that nothing was emitted meanwhile.
         let world = app.world_mut();
-        let (emitter, transform) = emitter(handle, rate);
+        let (mut emitter, transform) = emitter(handle, rate);
+        if !water {
+            // What the effect says, which is nothing.
+            emitter.flow = Flow::Effect;
+        }
         let emitter = world.spawn((emitter, transform, GlobalTransform::from(transform))).id();
         let queues = world.query();
         Self { app, queues, effect, emitter, readiness }
