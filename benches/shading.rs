@@ -6,21 +6,13 @@
 
 use std::time::Instant;
 
-use bevy::app::PanicHandlerPlugin;
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::RenderTarget;
 use bevy::camera::visibility::RenderLayers;
 use bevy::light::EnvironmentMapLight;
-use bevy::log::LogPlugin;
 use bevy::prelude::*;
-use bevy::render::RenderPlugin;
-use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
-use bevy::render::render_resource::{Extent3d, PollType, TextureDimension, TextureFormat, TextureUsages};
-use bevy::render::renderer::RenderDevice;
+use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat, TextureUsages};
 use bevy::time::TimeUpdateStrategy;
-use bevy::window::ExitCondition;
-use bevy::winit::WinitPlugin;
-use bevy_weathering::WeatheringPlugins;
 use bevy_weathering::material::{DryMaterial, PorousMaterial, WettingModel};
 use bevy_weathering::overlay::Weatherable;
 use bevy_weathering::scenes::stone::{Stone, stone_maps};
@@ -28,6 +20,7 @@ use bevy_weathering::schedule::WeatheringTick;
 use bevy_weathering::wetting::{SurfaceWater, WetGeometry};
 use criterion::Criterion;
 
+use crate::headless;
 use crate::measure;
 
 const SIZE: UVec2 = UVec2::new(1280, 1024);
@@ -67,33 +60,6 @@ fn walls() -> Vec<Wall> {
     ]
 }
 
-fn headless() -> App {
-    let mut app = App::new();
-    let no_window =
-        WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
-    app.add_plugins(
-        DefaultPlugins
-            .set(no_window)
-            .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
-            .disable::<WinitPlugin>()
-            .disable::<PipelinedRenderingPlugin>()
-            .disable::<LogPlugin>()
-            .disable::<PanicHandlerPlugin>(),
-    )
-    .add_plugins(WeatheringPlugins)
-    .insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
-    app.finish();
-    app.cleanup();
-    app
-}
-
-/// One frame, until the GPU is done with it.
-fn frame(app: &mut App) {
-    app.update();
-    let device = app.world().resource::<RenderDevice>().wgpu_device();
-    device.poll(PollType::Wait { submission_index: None, timeout: None }).unwrap();
-}
-
 /// Spawns a wall on a layer of its own.
 fn spawn_wall(
     app: &mut App,
@@ -128,7 +94,8 @@ pub fn bench(_: &mut Criterion) {
         return;
     }
     let walls = walls();
-    let mut app = headless();
+    let mut app = headless::app();
+    app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
     let world = app.world_mut();
     let mut target = Image::new_uninit(
         Extent3d { width: SIZE.x, height: SIZE.y, depth_or_array_layers: 1 },
@@ -181,7 +148,7 @@ pub fn bench(_: &mut Criterion) {
     }
     let weathered: Vec<_> = (0..walls.len()).filter(|&i| walls[i].porous.is_some()).collect();
     while !weathered.iter().all(|&i| app.world().get::<DryMaterial>(entities[i]).is_some()) {
-        frame(&mut app);
+        headless::frame(&mut app);
     }
     for (wall, &entity) in walls.iter().zip(&entities) {
         if wall.water_mm > 0.0 {
@@ -195,10 +162,10 @@ pub fn bench(_: &mut Criterion) {
     for round in 0..=ROUNDS {
         for (layer, seconds) in seconds.iter_mut().enumerate() {
             app.world_mut().entity_mut(camera).insert(RenderLayers::layer(layer));
-            frame(&mut app);
+            headless::frame(&mut app);
             let begun = Instant::now();
             for _ in 0..FRAMES {
-                frame(&mut app);
+                headless::frame(&mut app);
             }
             // The first round makes pipelines.
             if round > 0 {

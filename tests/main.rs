@@ -59,6 +59,8 @@ mod overload;
 mod pool;
 /// Skinned meshes in their pose.
 mod posed;
+/// What they refuse.
+mod refusals;
 /// The program as its users run it: output, errors, exit codes.
 mod replay;
 /// Scenes that are saved and gone on with, and accounts of all water.
