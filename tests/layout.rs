@@ -9,7 +9,7 @@ use bevy::math::{UVec2, Vec3};
 use bevy::render::render_resource::{ShaderType, encase::UniformBuffer};
 use bevy_weathering::material::{GpuDryingPoint, PorousUniform};
 use bevy_weathering::matter::GpuTexelMatter;
-use bevy_weathering::overlay::{MipStep, RainRing, Splat, SurfaceBatch, TexelFrame, TileHeader};
+use bevy_weathering::overlay::{MipStep, RainRing, SurfaceBatch, TexelFrame, TileHeader};
 use bevy_weathering::particle::{GpuLook, GpuParticle};
 use bevy_weathering::stamps::StampTexel;
 use bevy_weathering::wetting::gpu::GpuTexelWater;
@@ -110,31 +110,6 @@ macro_rules! rust_layout {
             size: size_of::<$row>() as u32,
         }
     }};
-}
-
-#[test]
-fn a_splat_is_the_same_row_on_both_sides() {
-    let rust = rust_layout!(Splat {
-        center,
-        radius,
-        water_nl,
-        tick,
-        diffuse,
-        specular,
-        bump,
-        bump_opacity,
-        stamp,
-        in_space,
-        row_s,
-        row_t,
-        row_n,
-        origin,
-        reach,
-        axis_s,
-        axis_t,
-        axis_n
-    });
-    assert_eq!(wgsl_layout(SPLAT, "Splat"), rust);
 }
 
 #[test]
