@@ -8,8 +8,8 @@
 // any of them there would be branches, of which some drivers always run both sides.
 
 #import bevy_weathering::kernel::{
-    Axis, axes_part, axis_offset, blend_over, bytes_from_color, color_from_bytes, cross_axes, depth_part, dot_axes, facing_part,
-    falloff, framed, lay_stamp, slope_color, slope_of, stamp_alpha, stamp_slope, turned, unpack_axis
+    Axis, axes_part, axis_offset, blend_pairs, bytes_from_color, color_from_bytes, cross_axes, depth_part, dot_axes, facing_part,
+    falloff, framed, lay_stamp, pairs, slope_color, slope_of, stamp_alpha, stamp_slope, turned, unpack_axis, unpaired
 }
 #import bevy_weathering::stamp::{StampTexel, STAMP_SIZE, mix4, on_stamp, stamp_corners}
 
@@ -82,6 +82,8 @@ const STRIDE: i32 = 8;
 // Texels of a splat, and of a row of `splats`.
 const SPLAT_TEXELS: u32 = 7u;
 const SPLAT_ROW_BITS: u32 = 10u;
+// Entries in a row of `splat_list`.
+const LIST_ROW_BITS: u32 = 12u;
 // Stamps in a row of the atlas.
 const STAMPS_ALONG: u32 = 32u;
 // Drops that a tile remembers, the newest first.
@@ -93,6 +95,8 @@ struct SurfaceBatch {
     size: u32,
     // The batch's first row in `tiles`.
     first_tile: u32,
+    // How many rows it has there.
+    tiles: u32,
     // Edges along u and v: 1 clamps, 0 repeats.
     clamped: vec2<u32>,
 }
@@ -101,7 +105,7 @@ struct SurfaceBatch {
 // Seven texels a splat, one row after the other: of buffers, some drivers read one number of one invocation at a time.
 @group(0) @binding(1) var splats: texture_2d<u32>;
 @group(0) @binding(2) var<storage, read> tiles: array<TileHeader>;
-@group(0) @binding(3) var<storage, read> splat_list: array<u32>;
+@group(0) @binding(3) var splat_list: texture_2d<u32>;
 // The atlas: `StampTexel`s, STAMPS_ALONG stamps beside each other.
 @group(0) @binding(4) var stamps: texture_2d<u32>;
 
@@ -112,11 +116,11 @@ struct SurfaceBatch {
 // A single one while nothing lies in space.
 @group(1) @binding(4) var<storage, read> frames: array<TexelFrame>;
 
-// What a texel of the maps holds, as bytes.
+// What a texel of the maps holds: of each colour red and blue, green and alpha, a byte in each half.
 struct Painted {
-    diffuse: vec4<u32>,
-    specular: vec4<u32>,
-    normal: vec4<u32>,
+    diffuse: vec2<u32>,
+    specular: vec2<u32>,
+    normal: vec2<u32>,
 }
 
 // Where a texel lies on a stamp; the twin of `Place` in `src/overlay/cpu.rs`.
@@ -128,6 +132,11 @@ struct Place {
     along_v: vec2<i32>,
     // How much of the stamp reaches it, 0..=256.
     part: u32,
+}
+
+// The number of a splat, from the lists of all tiles.
+fn listed(entry: u32) -> u32 {
+    return textureLoad(splat_list, vec2(entry & ((1u << LIST_ROW_BITS) - 1u), entry >> LIST_ROW_BITS), 0).r;
 }
 
 // One of the texels of a splat.
@@ -233,24 +242,20 @@ fn place_in_space(splat: Splat, texel: Standing) -> Place {
 }
 
 // A colour over a texel, premultiplied.
-fn paint_over(under: vec4<u32>, color: vec3<u32>, alpha: u32) -> vec4<u32> {
-    return vec4(
-        blend_over(color.r, alpha, under.r),
-        blend_over(color.g, alpha, under.g),
-        blend_over(color.b, alpha, under.b),
-        blend_over(255u, alpha, under.a),
-    );
+fn paint_over(under: vec2<u32>, color: vec3<u32>, alpha: u32) -> vec2<u32> {
+    return blend_pairs(pairs(vec4(color, 255u)), alpha, under);
 }
 
 // A colour of a stamp over a texel.
-fn stamp_over(under: vec4<u32>, color: vec4<u32>, tint: vec3<u32>, opacity: u32) -> vec4<u32> {
+fn stamp_over(under: vec2<u32>, color: vec4<u32>, tint: vec3<u32>, opacity: u32) -> vec2<u32> {
     let weight = color.a * opacity;
-    return vec4(
-        lay_stamp(color.r, tint.r, opacity, weight, under.r),
-        lay_stamp(color.g, tint.g, opacity, weight, under.g),
-        lay_stamp(color.b, tint.b, opacity, weight, under.b),
-        lay_stamp(color.a, 255u, opacity, weight, under.a),
-    );
+    let bytes = unpaired(under);
+    return pairs(vec4(
+        lay_stamp(color.r, tint.r, opacity, weight, bytes.r),
+        lay_stamp(color.g, tint.g, opacity, weight, bytes.g),
+        lay_stamp(color.b, tint.b, opacity, weight, bytes.b),
+        lay_stamp(color.a, 255u, opacity, weight, bytes.a),
+    ));
 }
 
 // A round dome over a texel.
@@ -326,13 +331,18 @@ fn unpack_bytes(packed: u32) -> vec4<u32> {
     return vec4(packed, packed >> 8u, packed >> 16u, packed >> 24u) & vec4(0xffu);
 }
 
-// Puts the newest drops that fell into a tile before those it remembers.
-fn remember_drops(tile: TileHeader, tiles_along: u32) {
-    let first = (tile.y * tiles_along + tile.x) * RINGS_PER_TILE;
+// Puts the newest drops that fell into a tile before those it remembers: one invocation for each tile.
+@compute @workgroup_size(64)
+fn remember_drops(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x >= batch.tiles {
+        return;
+    }
+    let tile = tiles[batch.first_tile + id.x];
+    let first = (tile.y * (batch.size / u32(TILE_SIZE)) + tile.x) * RINGS_PER_TILE;
     var fallen: array<RainRing, RINGS_PER_TILE>;
     var count = 0u;
     for (var i = tile.count; i > 0u && count < RINGS_PER_TILE; i -= 1u) {
-        let index = splat_list[tile.start + i - 1u];
+        let index = listed(tile.start + i - 1u);
         let center = vec2<i32>(splat_texel(index, 0u).xy);
         let shape = splat_texel(index, 2u);
         let home = center >> vec2(8u);
@@ -351,16 +361,16 @@ fn remember_drops(tile: TileHeader, tiles_along: u32) {
 
 fn painted_at(texel: vec2<i32>) -> Painted {
     return Painted(
-        bytes_from_color(textureLoad(diffuse_map, texel)),
-        bytes_from_color(textureLoad(specular_map, texel)),
-        bytes_from_color(textureLoad(normal_map, texel)),
+        pairs(bytes_from_color(textureLoad(diffuse_map, texel))),
+        pairs(bytes_from_color(textureLoad(specular_map, texel))),
+        pairs(bytes_from_color(textureLoad(normal_map, texel))),
     );
 }
 
 fn store(texel: vec2<i32>, painted: Painted) {
-    textureStore(diffuse_map, texel, color_from_bytes(painted.diffuse));
-    textureStore(specular_map, texel, color_from_bytes(painted.specular));
-    textureStore(normal_map, texel, color_from_bytes(painted.normal));
+    textureStore(diffuse_map, texel, color_from_bytes(unpaired(painted.diffuse)));
+    textureStore(specular_map, texel, color_from_bytes(unpaired(painted.specular)));
+    textureStore(normal_map, texel, color_from_bytes(unpaired(painted.normal)));
 }
 
 fn frame_at(texel: vec2<i32>) -> Standing {
@@ -391,7 +401,7 @@ fn paint_splats(
 #endif
 
     for (var i = tile.start; i < tile.start + tile.count; i += 1u) {
-        let splat = splat_at(splat_list[i]);
+        let splat = splat_at(listed(i));
         var place_a: Place;
         var place_b: Place;
         var place_c: Place;
@@ -424,9 +434,6 @@ fn paint_splats(
         painted_d = splat_over(painted_d, splat, place_d);
     }
 
-    if all(local.xy == vec2(0u)) {
-        remember_drops(tile, batch.size / u32(TILE_SIZE));
-    }
     store(a, painted_a);
     store(b, painted_b);
     store(c, painted_c);

@@ -57,9 +57,23 @@ fn stamp_alpha(opacity: u32, dome: u32) -> u32 {
     return (opacity * dome + 2048u) >> 12u;
 }
 
-// One channel over another, 0..=255, premultiplied.
-fn blend_over(source: u32, alpha: u32, under: u32) -> u32 {
-    return (source * alpha + under * (255u - alpha) + 127u) / 255u;
+// Two bytes in a number, each in its half.
+const PAIR: u32 = 0x00ff00ffu;
+
+// Red and blue, green and alpha of a colour.
+fn pairs(bytes: vec4<u32>) -> vec2<u32> {
+    return bytes.rg | (bytes.ba << vec2(16u));
+}
+
+fn unpaired(pairs: vec2<u32>) -> vec4<u32> {
+    return vec4(pairs & vec2(PAIR & 0xffffu), pairs >> vec2(16u));
+}
+
+// Four channels over others, 0..=255, premultiplied, two in each multiplication: the twin of `blend_over`, which divides by 255;
+// so does, rounded to the nearest, the sum of what is shifted here.
+fn blend_pairs(source: vec2<u32>, alpha: u32, under: vec2<u32>) -> vec2<u32> {
+    let mixed = source * alpha + under * (255u - alpha) + 0x00800080u;
+    return ((mixed + ((mixed >> vec2(8u)) & vec2(PAIR))) >> vec2(8u)) & vec2(PAIR);
 }
 
 // The slope of a dome of height `bump` (-127..=127) at an offset, as a colour: 128 is flat.

@@ -69,6 +69,8 @@ pub(super) struct SplatPipeline {
     pub(super) frame_layout: BindGroupLayoutDescriptor,
     pub(super) surface_layout: BindGroupLayoutDescriptor,
     shader: Handle<Shader>,
+    /// Puts drops among those that a tile remembers.
+    rings: CachedComputePipelineId,
     /// For [`SplatKinds::ALL`]: compiled first, in use until the one for what is there has been.
     all: CachedComputePipelineId,
 }
@@ -91,7 +93,7 @@ impl SpecializedComputePipeline for SplatPipeline {
 impl SplatPipeline {
     /// Whether anything can be painted yet.
     pub(super) fn is_ready(&self, cache: &PipelineCache) -> bool {
-        cache.get_compute_pipeline(self.all).is_some()
+        [self.all, self.rings].iter().all(|&pipeline| cache.get_compute_pipeline(pipeline).is_some())
     }
 
     /// The narrowest pipeline that is ready; all of them paint the same to the bit.
@@ -118,7 +120,7 @@ pub(super) fn init_splat_pipeline(
         "weathering splats",
         &BindGroupLayoutEntries::sequential(
             ShaderStages::COMPUTE,
-            (uniform_buffer::<SurfaceBatch>(true), numbers(), read_only(), read_only(), numbers()),
+            (uniform_buffer::<SurfaceBatch>(true), numbers(), read_only(), numbers(), numbers()),
         ),
     );
     let map = || texture_storage_2d(TextureFormat::Rgba8Unorm, StorageTextureAccess::ReadWrite);
@@ -133,8 +135,16 @@ pub(super) fn init_splat_pipeline(
         AssetPath::from_path_buf(embedded_path!("../../../shaders/splat.wgsl"))
             .with_source(AssetSourceId::from("embedded")),
     );
-    let mut pipeline =
-        SplatPipeline { frame_layout, surface_layout, shader, all: CachedComputePipelineId::INVALID };
+    let rings = cache.queue_compute_pipeline(ComputePipelineDescriptor {
+        label: Some("remember drops".into()),
+        layout: vec![frame_layout.clone(), surface_layout.clone()],
+        shader: shader.clone(),
+        shader_defs: SplatKinds::ALL.shader_defs(),
+        entry_point: Some("remember_drops".into()),
+        ..default()
+    });
+    let all = CachedComputePipelineId::INVALID;
+    let mut pipeline = SplatPipeline { frame_layout, surface_layout, shader, rings, all };
     pipeline.all = pipelines.specialize(&cache, &pipeline, SplatKinds::ALL);
     commands.insert_resource(pipeline);
 }
@@ -143,11 +153,13 @@ pub(super) fn init_splat_pipeline(
 pub(super) fn paint_splats(
     mut context: RenderContext,
     cache: Res<PipelineCache>,
+    pipeline: Res<SplatPipeline>,
     batches: Res<SplatBatches>,
     mip_pipeline: Res<MipPipeline>,
     mips: Res<MipBatches>,
 ) {
     let (Some(frame), false) = (&batches.frame, batches.jobs.is_empty()) else { return };
+    let Some(rings) = cache.get_compute_pipeline(pipeline.rings) else { return };
     let encoder = context.command_encoder();
     let mut pass = encoder
         .begin_compute_pass(&ComputePassDescriptor { label: Some("paint splats"), timestamp_writes: None });
@@ -158,6 +170,8 @@ pub(super) fn paint_splats(
         pass.set_bind_group(0, frame, &[job.batch_offset]);
         pass.set_bind_group(1, &job.surface, &[]);
         pass.dispatch_workgroups(job.tiles, 1, 1);
+        pass.set_pipeline(rings);
+        pass.dispatch_workgroups(job.tiles.div_ceil(64), 1, 1);
     }
     drop(pass);
     mips.halve(encoder, &cache, &mip_pipeline);

@@ -19,9 +19,9 @@ use super::backlog::Backlog;
 use super::maps::Overlays;
 use super::mips::{MipBatches, MipPipeline, SurfaceLevels};
 use super::pass::{SplatKinds, SplatPipeline};
-use super::texels::{SplatTexels, stamp_texture};
+use super::texels::{TexelRows, stamp_texture};
 use crate::overlay::{
-    Lying, SplatBudget, SplatQueue, StampAtlas, SurfaceFrames, TexelFrame, TileBins, TileHeader, Wrap,
+    Lying, Splat, SplatBudget, SplatQueue, StampAtlas, SurfaceFrames, TexelFrame, TileBins, TileHeader, Wrap,
 };
 
 /// What the pass needs to know about one surface. `SurfaceBatch` in `shaders/splat.wgsl` has the same fields.
@@ -31,6 +31,8 @@ pub struct SurfaceBatch {
     pub size: u32,
     /// The batch's first row in the tile buffer.
     pub first_tile: u32,
+    /// How many rows it has there.
+    pub tiles: u32,
     /// Edges along u and v: 1 clamps, 0 repeats.
     pub clamped: UVec2,
 }
@@ -185,9 +187,9 @@ fn fixed_buffer<T: bytemuck::Pod + Default>(device: &RenderDevice, label: &str, 
 #[derive(Resource)]
 pub(super) struct SplatBatches {
     batches: DynamicUniformBuffer<SurfaceBatch>,
-    texels: SplatTexels,
+    splats: TexelRows<Splat>,
     tiles: RawBufferVec<TileHeader>,
-    list: RawBufferVec<u32>,
+    list: TexelRows<u32>,
     bins: TileBins,
     /// For surfaces on which nothing lies in space.
     no_frames: Option<Buffer>,
@@ -210,9 +212,9 @@ impl Default for SplatBatches {
     fn default() -> Self {
         Self {
             batches: DynamicUniformBuffer::default(),
-            texels: SplatTexels::default(),
+            splats: TexelRows::splats(),
             tiles: RawBufferVec::new(BufferUsages::STORAGE),
-            list: RawBufferVec::new(BufferUsages::STORAGE),
+            list: TexelRows::list(),
             bins: TileBins::default(),
             no_frames: None,
             no_mask: None,
@@ -239,7 +241,7 @@ pub(super) fn prepare_splats(
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
 ) {
-    let SplatBatches { batches, texels, tiles, list, bins, no_frames, no_mask, frame, jobs } = &mut *batches;
+    let SplatBatches { batches, splats, tiles, list, bins, no_frames, no_mask, frame, jobs } = &mut *batches;
     jobs.clear();
     mips.clear();
     if pending.len() == 0
@@ -249,9 +251,9 @@ pub(super) fn prepare_splats(
         return;
     }
     batches.clear();
-    texels.splats.clear();
+    splats.values.clear();
     tiles.clear();
-    list.clear();
+    list.values.clear();
     let (mut room, mut bytes) = pending.budget.of_a_frame();
     let PendingSplats { surfaces, first, .. } = &mut *pending;
     let count = surfaces.len();
@@ -273,12 +275,12 @@ pub(super) fn prepare_splats(
             continue;
         }
         let first_tile = tiles.len() as u32;
-        let first_splat = texels.splats.len() as u32;
-        let first_entry = list.len();
+        let first_splat = splats.values.len() as u32;
+        let first_entry = list.values.len();
         let frames = waiting.frames.as_ref();
         let batch = waiting.backlog.waiting();
         let batch = &batch[..batch.len().min(room)];
-        let (headers, entries) = (tiles.values_mut(), list.values_mut());
+        let (headers, entries) = (tiles.values_mut(), &mut list.values);
         let taken = bins.bin_within(bytes, batch, size, wrap, frames, first_splat, headers, entries);
         let batch = &batch[..taken];
         let kinds = SplatKinds::of(batch);
@@ -300,7 +302,7 @@ pub(super) fn prepare_splats(
             let lying = waiting.lying.as_ref().unwrap_or(no_mask);
             SurfaceLevels::new(maps, lying, masked, &mip_pipeline, &cache, &device)
         }));
-        texels.splats.extend_from_slice(batch);
+        splats.values.extend_from_slice(batch);
         let touched = tiles.len() as u32 - first_tile;
         mips.add(levels, size, &tiles.values()[first_tile as usize..]);
         let clamped = UVec2::from_array(wrap.map(|wrap| u32::from(wrap == Wrap::Clamp)));
@@ -317,12 +319,13 @@ pub(super) fn prepare_splats(
                     frame_buffer.as_entire_buffer_binding(),
                 )),
             ),
-            batch_offset: batches.push(&SurfaceBatch { size, first_tile, clamped }),
+            batch_offset: batches.push(&SurfaceBatch { size, first_tile, tiles: touched, clamped }),
             tiles: touched,
         });
         stats.add(taken, touched as usize);
         room -= taken;
-        bytes = bytes.saturating_sub(TileBins::bytes(taken, touched as usize, list.len() - first_entry));
+        bytes =
+            bytes.saturating_sub(TileBins::bytes(taken, touched as usize, list.values.len() - first_entry));
         stats.carry(waiting.backlog.finish(taken));
         if !waiting.backlog.is_empty() {
             next = next.or(Some(index + 1));
@@ -332,15 +335,13 @@ pub(super) fn prepare_splats(
     stats.set_pending(pending.len());
     batches.write_buffer(&device, &queue);
     tiles.write_buffer(&device, &queue);
-    list.write_buffer(&device, &queue);
     mips.write(&mip_pipeline, &cache, &device, &queue);
-    let (Some(batches), Some(tiles), Some(list)) = (batches.binding(), tiles.binding(), list.binding())
-    else {
+    let (Some(batches), Some(tiles)) = (batches.binding(), tiles.binding()) else {
         return;
     };
     let StampTexture { atlas, texture } = &mut *stamps;
     let stamps = &*texture.get_or_insert_with(|| stamp_texture(atlas, &device, &queue));
-    let splats = texels.upload(&device, &queue);
+    let (splats, list) = (splats.upload(&device, &queue), list.upload(&device, &queue));
     *frame = Some(device.create_bind_group(
         "weathering splats",
         &cache.get_bind_group_layout(&pipeline.frame_layout),
