@@ -279,14 +279,15 @@ fn flags_are_the_same_bits_on_both_sides() {
 /// `SurfaceBatch` is written by encase, too.
 #[test]
 fn a_batch_is_read_as_it_is_written() {
-    let written = SurfaceBatch { size: 1, first_tile: 2, clamped: UVec2::new(3, 4) };
+    let written = SurfaceBatch { size: 1, first_tile: 2, tiles: 3, clamped: UVec2::new(4, 5) };
     let mut buffer = UniformBuffer::new(Vec::<u8>::new());
     buffer.write(&written).expect("a vector holds anything");
     let words: &[u32] = bytemuck::cast_slice(buffer.as_ref());
-    assert_eq!(words, [1, 2, 3, 4]);
+    // Before two numbers together there is a gap.
+    assert_eq!(words, [1, 2, 3, 0, 4, 5]);
     let Layout { fields, size } = wgsl_layout(SPLAT, "SurfaceBatch");
     let read: Vec<_> = fields.iter().map(|field| (field.name.as_str(), field.offset)).collect();
-    assert_eq!(read, [("size", 0), ("first_tile", 4), ("clamped", 8)]);
+    assert_eq!(read, [("size", 0), ("first_tile", 4), ("tiles", 8), ("clamped", 16)]);
     assert_eq!(u64::from(size), SurfaceBatch::min_size().get());
 }
 

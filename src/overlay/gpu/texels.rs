@@ -11,7 +11,7 @@ use bevy::render::render_resource::{
 use bevy::render::renderer::{RenderDevice, RenderQueue};
 use bytemuck::Pod;
 
-use crate::overlay::{Splat, SplatBudget, StampAtlas};
+use crate::overlay::{Splat, StampAtlas};
 use crate::stamps::StampTexel;
 use crate::stamps::sample::{STAMP_SIZE, STAMP_TEXELS};
 
@@ -88,7 +88,7 @@ impl<T: Pod> TexelRows<T> {
         Self { label, format, row, values: Vec::new(), last_row: Vec::new(), texture: None }
     }
 
-    /// Uploads them, into a larger texture if they are more than ever; [`SplatBudget::LARGEST`] fits.
+    /// Uploads them, into a larger texture if they are more than ever; [`SplatBudget::LARGEST`](crate::overlay::SplatBudget::LARGEST) fits.
     pub(super) fn upload(&mut self, device: &RenderDevice, queue: &RenderQueue) -> &TextureView {
         let bytes: &[u8] = bytemuck::cast_slice(&self.values);
         let row_bytes = (self.row * self.format.block_copy_size(None).unwrap_or(4)) as usize;
@@ -131,6 +131,7 @@ pub(super) fn stamp_texture(atlas: &StampAtlas, device: &RenderDevice, queue: &R
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::overlay::SplatBudget;
 
     #[test]
     fn the_largest_frame_fits() {
