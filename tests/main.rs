@@ -71,6 +71,8 @@ mod schedule;
 mod seams;
 /// Events of scenarios, includes, variants, checks.
 mod timeline;
+/// Which emitter wetted what.
+mod sources;
 /// The smaller tools of the program.
 mod tools;
 /// Meshes whose texture coordinates lie on each other.

@@ -4,6 +4,7 @@ use bevy::asset::AssetPath;
 use bevy::asset::embedded_path;
 use bevy::asset::io::AssetSourceId;
 use bevy::prelude::*;
+use bevy::render::diagnostic::RecordDiagnostics;
 use bevy::render::render_resource::binding_types::{
     storage_buffer_read_only_sized, storage_buffer_sized, texture_storage_2d, uniform_buffer,
 };
@@ -15,6 +16,7 @@ use bevy::render::renderer::RenderContext;
 
 use super::mips::{MipBatches, MipPipeline};
 use super::prepare::{SplatBatches, SurfaceBatch};
+use super::stats::SplatStats;
 
 /// The compiled pass.
 #[derive(Resource)]
@@ -75,7 +77,11 @@ pub(super) fn paint_splats(
     else {
         return;
     };
+    // Nothing, unless the app has Bevy's `RenderDiagnosticsPlugin`.
+    let diagnostics = context.diagnostic_recorder();
+    let diagnostics = diagnostics.as_deref();
     let encoder = context.command_encoder();
+    let span = diagnostics.time_span(encoder, SplatStats::SPAN);
     let mut pass = encoder
         .begin_compute_pass(&ComputePassDescriptor { label: Some("paint splats"), timestamp_writes: None });
     pass.set_pipeline(pipeline);
@@ -86,4 +92,5 @@ pub(super) fn paint_splats(
     }
     drop(pass);
     mips.halve(encoder, &cache, &mip_pipeline);
+    span.end(encoder);
 }
