@@ -69,10 +69,10 @@ mod save;
 mod schedule;
 /// Marks across the borders of uv islands.
 mod seams;
-/// Events of scenarios, includes, variants, checks.
-mod timeline;
 /// Which emitter wetted what.
 mod sources;
+/// Events of scenarios, includes, variants, checks.
+mod timeline;
 /// The smaller tools of the program.
 mod tools;
 /// Meshes whose texture coordinates lie on each other.

@@ -80,7 +80,13 @@ impl Scene {
         let size = self.water(surface).size() as f32;
         let center = [uv.x, uv.y].map(|part| (part * size * 256.0) as i32);
         let mut queue = self.0.world_mut().get_mut::<DropQueue>(surface).unwrap();
-        queue.0.push(Drop { center, radius: [radius * 256; 2], water_nl, speed_mm: 0, source: Source::UNKNOWN });
+        queue.0.push(Drop {
+            center,
+            radius: [radius * 256; 2],
+            water_nl,
+            speed_mm: 0,
+            source: Source::UNKNOWN,
+        });
     }
 
     /// Whether a surface comes to rest within so many seconds.
