@@ -39,7 +39,7 @@ pub fn plugin(app: &mut App) {
 
 fn show(ui: &mut egui::Ui, world: &mut World) {
     shades::show(ui, world);
-    ui.heading("Beside them");
+    ui.heading("Over the scene");
     boxes::show(ui, world);
     heat::show(ui, world);
     let seams = world.resource::<Seams>();
