@@ -69,6 +69,8 @@ mod save;
 mod schedule;
 /// Marks across the borders of uv islands.
 mod seams;
+/// Which emitter wetted what.
+mod sources;
 /// Events of scenarios, includes, variants, checks.
 mod timeline;
 /// The smaller tools of the program.

@@ -4,11 +4,13 @@
 //! (local -Z). How many it owes is kept as an exact remainder: 1,000/s for 10 s are 10,000 particles at any tick
 //! rate. Within a tick they are born evenly spread, so a jet is a jet and no row of clouds. Where there is no room for
 //! all, fewer stand for more ([`EmissionDetail`]). Each emitter has its own random stream, seeded by [`EmissionSeed`]
-//! and the emitter's number; nothing else draws from it.
+//! and the emitter's number; nothing else draws from it. Which emitter it was that wetted a place is known to those who ask
+//! ([`TrackSources`]).
 
 mod detail;
 mod emit;
 mod shape;
+mod sources;
 
 use bevy::prelude::*;
 use schemars::JsonSchema;
@@ -19,6 +21,7 @@ use crate::schedule::{WeatheringSystems, WeatheringTick};
 
 pub use detail::EmissionDetail;
 pub use emit::{EmitterState, NewParticles, emit_particles, spawn_particles};
+pub use sources::{Source, TrackSources};
 
 /// Sends out particles of one effect. Configuration only; see [`EmitterState`] for what it has done.
 #[derive(Component, Reflect, Debug, Clone)]
@@ -158,6 +161,7 @@ impl Plugin for EmitterPlugin {
         app.register_type::<Emitter>()
             .register_type::<EmissionSeed>()
             .register_type::<EmissionDetail>()
+            .register_type::<TrackSources>()
             .init_resource::<EmissionSeed>()
             .init_resource::<EmissionDetail>()
             .init_resource::<NewParticles>()

@@ -8,6 +8,7 @@ use super::SurfaceMatter;
 use super::advance::{MatterScratch, advance_matter};
 use super::settle::{self, Deposit, deposit};
 use crate::collision::MeshTriangles;
+use crate::emitter::Source;
 use crate::material::PorousMaterial;
 use crate::overlay::{Weatherable, Wrap};
 use crate::weather::{DryingClock, Weather};
@@ -129,7 +130,8 @@ impl Ground {
             let along =
                 |step: u32| ((u64::from(self.drops.wrapping_mul(step)) * u64::from(across)) >> 32) as i32;
             let center = [along(3_242_174_889), along(2_447_445_414)];
-            let drop = Drop { center, radius: [384; 2], water_nl: 4189, speed_mm: 6500 };
+            let drop =
+                Drop { center, radius: [384; 2], water_nl: 4189, speed_mm: 6500, source: Source::UNKNOWN };
             let matter = self.matter.awake(place.geometry.size());
             soak(&mut self.water, &now, &[drop], &mut self.soak, matter, &place.weather);
         }

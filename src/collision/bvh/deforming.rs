@@ -15,6 +15,7 @@ use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
+use obvhs::bvh2::node::Bvh2Node;
 use obvhs::ray::RayHit;
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
@@ -59,6 +60,11 @@ impl DeformingBvh {
             // In the middle of a tick: a quick tree will do.
             self.rebuild(positions, BvhBuildParams::fast_build());
         }
+    }
+
+    /// The tree, the root first; empty while nothing can be hit.
+    pub(super) fn nodes(&self) -> &[Bvh2Node] {
+        if self.bounds.is_some() { &self.bvh.nodes } else { &[] }
     }
 
     /// Smallest and largest corner of everything that can be hit, with some rounding errors to spare; `None` if nothing

@@ -6,11 +6,13 @@
 //! | `deforming` | [`DeformingBvh`]: the triangles of one surface that is posed, refitted when it moves |
 //! | `boxes` | [`BoxBvh`]: the boxes of all surfaces |
 //! | `overlaps` | nothing: [`BoxOverlaps`] tells which of many boxes overlap one |
+//! | `levels` | nothing: the boxes of a tree, to be looked at |
 //!
 //! obvhs has a glam of its own version; values cross over as arrays, so that no lock file can make them differ.
 
 mod boxes;
 mod deforming;
+mod levels;
 mod overlaps;
 
 use bevy::prelude::*;

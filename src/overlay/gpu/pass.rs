@@ -4,6 +4,7 @@ use bevy::asset::AssetPath;
 use bevy::asset::embedded_path;
 use bevy::asset::io::AssetSourceId;
 use bevy::prelude::*;
+use bevy::render::diagnostic::RecordDiagnostics;
 use bevy::render::render_resource::binding_types::{
     storage_buffer_read_only_sized, storage_buffer_sized, texture_2d, texture_storage_2d, uniform_buffer,
 };
@@ -17,6 +18,7 @@ use bevy::shader::ShaderDefVal;
 
 use super::mips::{MipBatches, MipPipeline};
 use super::prepare::{SplatBatches, SurfaceBatch};
+use super::stats::SplatStats;
 use crate::overlay::Splat;
 
 /// What a batch of splats holds. The pipeline that paints it does nothing else.
@@ -160,7 +162,11 @@ pub(super) fn paint_splats(
 ) {
     let (Some(frame), false) = (&batches.frame, batches.jobs.is_empty()) else { return };
     let Some(rings) = cache.get_compute_pipeline(pipeline.rings) else { return };
+    // Nothing, unless the app has Bevy's `RenderDiagnosticsPlugin`.
+    let diagnostics = context.diagnostic_recorder();
+    let diagnostics = diagnostics.as_deref();
     let encoder = context.command_encoder();
+    let span = diagnostics.time_span(encoder, SplatStats::SPAN);
     let mut pass = encoder
         .begin_compute_pass(&ComputePassDescriptor { label: Some("paint splats"), timestamp_writes: None });
     for job in &batches.jobs {
@@ -175,6 +181,7 @@ pub(super) fn paint_splats(
     }
     drop(pass);
     mips.halve(encoder, &cache, &mip_pipeline);
+    span.end(encoder);
 }
 
 #[cfg(test)]

@@ -109,15 +109,19 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     show_pores(ui, &mut material);
     ui.heading("Look");
     show_model(ui, &mut material);
-    if material != before {
-        world.entity_mut(surface).insert(material);
+    if material != before
+        && let Ok(mut entity) = world.get_entity_mut(surface)
+    {
+        entity.insert(material);
     }
     let before = world.get::<StandingWater>(surface).copied().unwrap_or_default();
     let mut water = before;
     ui.heading("Water that stands");
     show_standing(ui, &mut water);
-    if water != before {
-        world.entity_mut(surface).insert(water);
+    if water != before
+        && let Ok(mut entity) = world.get_entity_mut(surface)
+    {
+        entity.insert(water);
     }
 }
 
