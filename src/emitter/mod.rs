@@ -6,10 +6,14 @@
 //! all, fewer stand for more ([`EmissionDetail`]). Each emitter has its own random stream, seeded by [`EmissionSeed`]
 //! and the emitter's number; nothing else draws from it. Which emitter it was that wetted a place is known to those who ask
 //! ([`TrackSources`]).
+//!
+//! [`Emitter::hose`], [`Emitter::rain`], [`Emitter::snow`] and [`Emitter::dust`] are what is wanted most.
 
 mod detail;
 mod emit;
 mod shape;
+mod silent;
+mod sky;
 mod sources;
 
 use bevy::prelude::*;
@@ -21,6 +25,7 @@ use crate::schedule::{WeatheringSystems, WeatheringTick};
 
 pub use detail::EmissionDetail;
 pub use emit::{EmitterState, NewParticles, emit_particles, spawn_particles};
+pub use silent::NotEmitting;
 pub use sources::{Source, TrackSources};
 
 /// Sends out particles of one effect. Configuration only; see [`EmitterState`] for what it has done.
@@ -28,7 +33,8 @@ pub use sources::{Source, TrackSources};
 #[reflect(Component)]
 #[require(Transform, EmitterState)]
 pub struct Emitter {
-    /// What it sends out. Nothing is emitted (nor owed) before the asset is loaded.
+    /// What it sends out. Nothing is emitted (nor owed) before the asset is loaded; if it cannot be, the log and
+    /// [`NotEmitting`] say so.
     pub effect: Handle<WeatherEffect>,
     /// Particles per second, 0 or more.
     pub rate: f32,
@@ -81,6 +87,7 @@ pub enum Flow {
 
 impl Emitter {
     /// A hose of so many litres a minute through a nozzle of this diameter, metres: 15 l/min through 6 mm leave it at 8.8 m/s.
+    /// Its effect is [`WeatherEffect::HOSE`], or one of yours.
     pub fn hose(effect: Handle<WeatherEffect>, litres_per_minute: f32, nozzle: f32) -> Self {
         let speed = nozzle_speed(litres_per_minute, nozzle / 2.0);
         let shape = EmitterShape::Cone { radius: nozzle / 2.0 };
@@ -162,12 +169,15 @@ impl Plugin for EmitterPlugin {
             .register_type::<EmissionSeed>()
             .register_type::<EmissionDetail>()
             .register_type::<TrackSources>()
+            .register_type::<NotEmitting>()
             .init_resource::<EmissionSeed>()
             .init_resource::<EmissionDetail>()
             .init_resource::<NewParticles>()
             .add_systems(
                 WeatheringTick,
                 (emit_particles, spawn_particles).chain().in_set(WeatheringSystems::Emit),
-            );
+            )
+            // When all that a frame loads and spawns is there.
+            .add_systems(Last, silent::tell_silent);
     }
 }

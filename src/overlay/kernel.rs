@@ -304,9 +304,9 @@ mod tests {
         assert_eq!((turned([1024, 0], [77, -5]), turned([0, -1024], [77, -5])), (77, 5));
         // Flat stays flat, and a slope along the stamp's first axis is one along the map's, if they are the same.
         assert_eq!((slope_of(100, 200), slope_of(110, 200)), (0, 10));
-        assert_eq!(stamp_slope([0, 0], [1024, 0], 1024, 127, 200), 100);
-        assert_eq!(stamp_slope([10, 3], [1024, 0], 1024, 127, 200), 110);
-        assert_eq!(stamp_slope([10, 3], [0, 1024], 1024, -127, 200), 97);
+        assert_eq!(stamp_slope([0, 0], [1024, 0], 127, 200), 100);
+        assert_eq!(stamp_slope([10, 3], [1024, 0], 127, 200), 110);
+        assert_eq!(stamp_slope([10, 3], [0, 1024], -127, 200), 97);
     }
 
     #[test]

@@ -41,6 +41,7 @@ mod posed;
 mod prepare;
 mod put_back;
 pub(crate) mod query;
+mod ready;
 mod rim;
 mod run_off;
 mod slopes;
@@ -68,6 +69,7 @@ pub use points::{SurfacePoint, surface_points};
 pub use prepare::WetGeometry;
 pub(crate) use prepare::{ExchangeMatter, put_matter};
 pub use query::{BecameWet, Dried, SurfaceWetness, WatchWetness, Wetness, WetnessQuery};
+pub use ready::{Refusal, SurfaceReady, SurfaceRefused};
 pub use soak::Drop;
 pub use surface::{Ledger, Stock, SurfaceWater};
 pub use texel::{Scale, TexelWater, Units};
@@ -107,6 +109,11 @@ impl Plugin for WettingPlugin {
             .init_resource::<ExposureProgress>()
             .add_message::<BecameWet>()
             .add_message::<Dried>()
+            .add_message::<SurfaceReady>()
+            .add_message::<SurfaceRefused>()
+            .add_observer(ready::tell_ready)
+            .add_observer(ready::tell_refused_mesh)
+            .add_observer(ready::tell_refused_maps)
             .add_observer(prepare::release_surface)
             .add_observer(prepare::release_maps)
             .add_systems(
