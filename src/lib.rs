@@ -26,6 +26,7 @@ pub mod export;
 mod input;
 pub mod material;
 pub mod matter;
+pub mod offscreen;
 pub mod output;
 pub mod overlay;
 pub mod overload;

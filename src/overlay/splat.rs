@@ -90,13 +90,8 @@ impl Splat {
 
     /// The texels the stamp touches along an axis, each once, brought into the map.
     pub fn texels(&self, index: usize, size: u32, wrap: [Wrap; 2]) -> impl Iterator<Item = u32> + use<> {
-        let side = size as i32;
         let (first, last) = self.span(index);
-        let (first, last) = match wrap[index] {
-            Wrap::Repeat => (first, last.min(first + side - 1)),
-            Wrap::Clamp => (first.clamp(0, side - 1), last.clamp(0, side - 1)),
-        };
-        (first..=last).map(move |texel| texel.rem_euclid(side) as u32)
+        wrap[index].cells(first, last, size)
     }
 
     /// First and last texel the stamp touches along an axis, before wrapping or clamping.
@@ -109,6 +104,19 @@ impl Splat {
 /// Four values of 0..=1 as bytes, the first in the lowest.
 pub(crate) fn pack_unorm(values: [f32; 4]) -> u32 {
     u32::from_le_bytes(values.map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8))
+}
+
+impl Wrap {
+    /// The columns or rows of a map with so many along that axis, texels or tiles, from `first` to `last`; those beyond an edge
+    /// are brought into the map. None comes twice: what goes all the way round ends before where it began.
+    pub(crate) fn cells(self, first: i32, last: i32, count: u32) -> impl Iterator<Item = u32> + Clone {
+        let count = count as i32;
+        let (first, last) = match self {
+            Self::Repeat => (first, last.min(first.saturating_add(count - 1))),
+            Self::Clamp => (first.clamp(0, count - 1), last.clamp(0, count - 1)),
+        };
+        (first..=last).map(move |cell| cell.rem_euclid(count) as u32)
+    }
 }
 
 #[cfg(test)]

@@ -20,7 +20,7 @@ use obvhs::ray::RayHit;
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
 
-use super::{HEAD_START, LocalHit, Segment, corners_of, intersect, pad_within, padded, quality};
+use super::{LocalHit, Segment, corners_of, intersect, pad_within, padded, quality};
 
 /// A tree that costs this many times what it did when it was built is built anew.
 const REBUILD_COST: f64 = 2.0;
@@ -80,12 +80,9 @@ impl DeformingBvh {
         self.bounds?;
         let mut hit = RayHit::none();
         let ray = segment.ray(fraction);
-        self.bvh.ray_traverse(ray, &mut hit, |ray, leaf| intersect(&self.leaves[leaf], ray)).then(|| {
-            LocalHit {
-                fraction: hit.t - HEAD_START,
-                triangle: self.bvh.primitive_indices[hit.primitive_id as usize],
-            }
-        })
+        self.bvh
+            .ray_traverse(ray, &mut hit, |ray, leaf| intersect(&self.leaves[leaf], ray))
+            .then(|| LocalHit::new(&hit, &self.bvh.primitive_indices))
     }
 
     fn rebuild(&mut self, positions: &[Vec3], quality: BvhBuildParams) {
