@@ -77,7 +77,7 @@ pub(super) fn splat_from_impact(
     let [r, g, b] = effect.diffuse.color;
     let [reflectance, smoothness, unused] = effect.specular.color;
     let (first, count) = row.stamps;
-    let stamp = if count == 0 { 0 } else { first + hash(impact.sequence.0 ^ 0x5bd1_e995) % count };
+    let stamp = if count == 0 { 0 } else { first + pcg(impact.sequence.0 ^ 0x5bd1_e995) % count };
     let mut splat = Splat {
         center: Splat::center_from_uv(impact.uv, size, wrap),
         radius: Splat::radius_from_uv(impact.uv_per_metre * long, size),
