@@ -12,14 +12,12 @@ use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
 use bevy::render::RenderPlugin;
 use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
-use bevy::render::render_resource::PollType;
-use bevy::render::renderer::RenderDevice;
 use bevy::tasks::block_on;
 use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
 use bevy::world_serialization::WorldSerializationPlugin;
 
-use super::{ReplayError, ReplayOptions};
+use super::{ReplayError, ReplayOptions, failure};
 use crate::WeatheringPlugins;
 use crate::overlay::{CpuOverlayPlugin, GpuOverlayPlugin};
 use crate::scenario::ScenarioPlugin;
@@ -78,7 +76,7 @@ pub(super) fn build(options: &ReplayOptions, scenario: ScenarioPlugin) -> App {
                 .disable::<PanicHandlerPlugin>()
                 .disable::<TerminalCtrlCHandlerPlugin>(),
         )
-        .add_plugins(WeatheringPlugins)
+        .add_plugins((WeatheringPlugins, failure::plugin))
         .insert_resource(options.splats);
     } else {
         app = headless(tasks, assets);
@@ -109,14 +107,4 @@ pub(crate) fn headless(tasks: TaskPoolPlugin, assets: AssetPlugin) -> App {
         .add_plugins(WeatheringPlugins.build().disable::<GpuOverlayPlugin>())
         .add_plugins(CpuOverlayPlugin);
     app
-}
-
-/// Blocks until the GPU has done all it was given.
-pub(super) fn wait_for_gpu(world: &World) {
-    if let Some(device) = world.get_resource::<RenderDevice>()
-        && let Err(error) =
-            device.wgpu_device().poll(PollType::Wait { submission_index: None, timeout: None })
-    {
-        error!("the graphics device stopped answering: {error}");
-    }
 }
