@@ -133,15 +133,14 @@ shot "a stroke of a brush"
 xdotool key ctrl+z
 shot "a stroke taken back"
 
-# Probe, maps, plots; then all panels by their tabs, which lie in the first rows of the left one.
+# Probe, maps, plots; then all panels by their tabs, in the first two rows at the left.
 xdotool key i mousemove 640 360 click 1 key m key p
 shot "maps and plots"
-for x in 30 80 130 190 250; do
-    for y in 52 74; do
-        xdotool mousemove "${x}" "${y}" click 1
-        sleep 0.2
-        alive "opening panels"
-    done
+for tab in '90 43' '150 43' '220 43' '292 43' '36 70' '104 70' '170 70' '221 70' '282 70' '36 43'; do
+    read -r x y <<<"${tab}"
+    xdotool mousemove "${x}" "${y}" click 1
+    sleep 0.4
+    alive "opening panels"
 done
 # Into the scene: whatever of the panels had the keyboard, has it no more.
 xdotool key i mousemove 640 300 click 1
