@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
-# Opens the sandbox on a virtual screen and uses it as a person would: keys, mouse, panels, another scene. Fails if the program
-# ends before it is told to, or if a picture of the screen is black. Arguments: folder for the pictures [out/smoke], scene.
+# Opens the sandbox on a virtual screen and uses it as a person would: keys, mouse, panels, saving. Fails if the first picture comes
+# too late or black, if the program ends before it is told to, if it does not answer, or if a picture is of one colour.
+# Arguments: folder for pictures and the saved scene [out/smoke], scene [the hose].
+# WEATHERING_PROGRAM: a program that is built already; WEATHERING_START_SECONDS: when the first picture has to be there [5].
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 window_libraries
@@ -9,36 +11,55 @@ command -v xdotool >/dev/null || install xdotool
 
 out="${1:-out/smoke}"
 scene="${2:-assets/scenarios/hose.ron}"
-cargo build --release --bin weathering
-weathering="${CARGO_TARGET_DIR}/release/weathering"
+limit="${WEATHERING_START_SECONDS:-5}"
+weathering="${WEATHERING_PROGRAM:-}"
+if [ -z "${weathering}" ]; then
+    cargo build --release --bin weathering
+    weathering="${CARGO_TARGET_DIR}/release/weathering"
+fi
 scratch="$(mktemp -d)"
 mkdir -p "${out}"
-rm -f "${out}"/*.png
+rm -rf "${out}"/screenshot_*.png "${out}/saved"
 
 screen_pid='' sandbox_pid=''
 finish() {
-    [ -z "${sandbox_pid}" ] || kill "${sandbox_pid}" 2>/dev/null || true
-    [ -z "${screen_pid}" ] || kill "${screen_pid}" 2>/dev/null || true
+    local pid
+    for pid in "${sandbox_pid}" "${screen_pid}"; do
+        [ -z "${pid}" ] || { kill "${pid}" && wait "${pid}"; } 2>/dev/null || true
+    done
     rm -rf "${scratch}"
 }
 trap finish EXIT
 
-Xvfb -displayfd 3 -screen 0 1280x720x24 3>"${scratch}/display" 2>/dev/null &
+fail() {
+    echo "smoke: $*" >&2
+    [ ! -e "${scratch}/log" ] || tail -n 40 "${scratch}/log" >&2
+    exit 1
+}
+
+# A white screen. The server keeps what is on it in a file: a header of big-endian words, colours, pixels of four bytes.
+Xvfb -displayfd 3 -screen 0 1280x720x24 -wr -fbdir "${scratch}" 3>"${scratch}/display" 2>/dev/null &
 screen_pid=$!
-for _ in $(seq 100); do [ -s "${scratch}/display" ] && break; sleep 0.1; done
+for _ in $(seq 100); do [ ! -s "${scratch}/display" ] || break; sleep 0.1; done
+[ -s "${scratch}/display" ] || fail "Xvfb does not start"
 DISPLAY=":$(tr -d '[:space:]' <"${scratch}/display")"
 export DISPLAY
+memory="${scratch}/Xvfb_screen0"
+word() { od -An -tu4 --endian=big -j "$((4 * $1))" -N 4 "${memory}" | tr -d '[:space:]'; }
+pixels_at=$(($(word 0) + 12 * $(word 19) + 1))
+
+# Bytes of the screen that are neither 0 nor 255: none of a white screen or a black window.
+lit() { tail -c "+${pixels_at}" "${memory}" | tr -d '\000\377' | wc -c; }
+# Bytes that are 0: one of four in any case, more than half of all if there is a black window.
+zeros() { tail -c "+${pixels_at}" "${memory}" | tr -dc '\000' | wc -c; }
+
+milliseconds() { echo "$((${EPOCHREALTIME/[.,]/} / 1000))"; }
 
 # Settings of its own: a run does not depend on the last one.
+started="$(milliseconds)"
 XDG_RUNTIME_DIR="${scratch}" XDG_CONFIG_HOME="${scratch}/config" \
     "${weathering}" sandbox "${scene}" --out "${out}" >"${scratch}/log" 2>&1 &
 sandbox_pid=$!
-
-fail() {
-    echo "smoke: $*" >&2
-    tail -n 40 "${scratch}/log" >&2
-    exit 1
-}
 
 alive() { kill -0 "${sandbox_pid}" 2>/dev/null || fail "the sandbox ended while: $1"; }
 
@@ -49,50 +70,49 @@ await() {
     until "$@" >/dev/null 2>&1; do
         alive "waiting for ${what}"
         [ "${SECONDS}" -lt "${end}" ] || fail "waited in vain for ${what}"
-        sleep 0.2
+        sleep 0.1
     done
 }
 
-titled() { xdotool getwindowname "${window}" | grep -qF "$1"; }
+# The first picture: nothing black before it.
+while [ "$(lit)" -lt 100000 ]; do
+    alive "waiting for the first picture"
+    [ "$(zeros)" -lt 1400000 ] || fail "the window was black before its first picture"
+    [ $(($(milliseconds) - started)) -lt 120000 ] || fail "no picture"
+    sleep 0.02
+done
+took=$(($(milliseconds) - started))
+echo "smoke: the first picture came after ${took} ms"
+[ "${took}" -le $((limit * 1000)) ] || fail "the first picture took longer than ${limit} s"
 
-# A picture of one colour is some three kilobytes at this size; any scene has ten times that.
-check_size() {
-    local bytes
-    bytes="$(stat -c %s "$1")"
-    [ "${bytes}" -gt 12000 ] || fail "$1 is black, or of one colour (${bytes} bytes)"
+window=''
+find_window() {
+    local found
+    found="$(xdotool search --onlyvisible --name weathering)"
+    window="${found%%$'\n'*}"
+    [ -n "${window}" ]
 }
+await "a window" 20 find_window
+timeout 20 xdotool windowfocus --sync "${window}" || fail "the window does not take the keyboard"
+# Title and text: what the title ends with, but for brackets.
+titled() { [[ "$(xdotool getwindowname "${window}")" == *"($1)" ]]; }
+await "the scene" 60 titled running
+echo "smoke: running after $(($(milliseconds) - started)) ms"
 
-# The sandbox's own picture, without panels, and one of the whole screen where there is a tool for it.
+# The sandbox's own picture, without panels, and what is on the screen. Of one colour it is some three kilobytes at this size;
+# any scene has ten times that.
 shots=0
 shot() {
     alive "$1"
-    local own="${out}/screenshot_$(printf %03d "${shots}").png"
+    local own bytes
+    own="${out}/screenshot_$(printf %03d "${shots}").png"
     xdotool key F12
     await "the picture of: $1" 60 test -s "${own}"
-    check_size "${own}"
-    if command -v import >/dev/null; then
-        import -window root "${out}/screen_$(printf %03d "${shots}").png"
-        check_size "${out}/screen_$(printf %03d "${shots}").png"
-    elif command -v xwd >/dev/null; then
-        local lit
-        xwd -root -silent -out "${scratch}/screen.xwd"
-        lit="$(tail -c +4096 "${scratch}/screen.xwd" | tr -d '\000\377' | wc -c)"
-        [ "${lit}" -gt 100000 ] || fail "the screen is black at: $1"
-    fi
+    bytes="$(stat -c %s "${own}")"
+    [ "${bytes}" -gt 12000 ] || fail "${own} is black, or of one colour (${bytes} bytes), at: $1"
+    [ "$(lit)" -gt 100000 ] || fail "the screen is black at: $1"
     shots=$((shots + 1))
 }
-
-started="${SECONDS}"
-window=''
-find_window() { window="$(xdotool search --name weathering | head -n 1)" && [ -n "${window}" ]; }
-until find_window; do
-    alive "opening a window"
-    [ $((SECONDS - started)) -lt 60 ] || fail "no window"
-    sleep 0.2
-done
-xdotool windowfocus --sync "${window}"
-await "the scene" 120 titled "(running)"
-echo "smoke: running after $((SECONDS - started)) s"
 shot "the first picture"
 
 # The right button turns, the wheel comes closer, the left one sprays.
@@ -113,37 +133,43 @@ shot "a stroke of a brush"
 xdotool key ctrl+z
 shot "a stroke taken back"
 
-# Probe, maps, plots, help; all panels by their tabs, which lie in the first rows of the left panel.
+# Probe, maps, plots; then all panels by their tabs, in the first two rows at the left.
 xdotool key i mousemove 640 360 click 1 key m key p
 shot "maps and plots"
 xdotool key v
 shot "how wet surfaces are, in false colours"
 xdotool key v key v key v key v
-for x in 30 80 130 190 250; do
-    for y in 52 74; do
-        xdotool mousemove "${x}" "${y}" click 1
-        sleep 0.2
-        alive "opening panels"
-    done
+for tab in '90 43' '150 43' '220 43' '292 43' '36 70' '104 70' '170 70' '221 70' '282 70' '36 43'; do
+    read -r x y <<<"${tab}"
+    xdotool mousemove "${x}" "${y}" click 1
+    sleep 0.4
+    alive "opening panels"
 done
+# Into the scene: whatever of the panels had the keyboard, has it no more.
+xdotool key i mousemove 640 300 click 1
 xdotool key F1
 shot "the help"
 xdotool key F1 key u
 shot "no panels"
 xdotool key u key space
-await "a pause" 20 titled "(paused)"
+await "a pause" 20 titled paused
 xdotool key n key n key r
 shot "one tick, started over"
 xdotool key c key w key c key f key space
-await "going on" 20 titled "(running)"
+await "going on" 20 titled running
 shot "going on"
 
-xdotool key Escape
-for _ in $(seq 100); do kill -0 "${sandbox_pid}" 2>/dev/null || break; sleep 0.1; done
+# It leaves when the scene is saved, and not before.
+xdotool key r
+xdotool key ctrl+s key Escape
+for _ in $(seq 300); do kill -0 "${sandbox_pid}" 2>/dev/null || break; sleep 0.1; done
+! kill -0 "${sandbox_pid}" 2>/dev/null || fail "it does not leave"
 status=0
 wait "${sandbox_pid}" || status=$?
 sandbox_pid=''
 [ "${status}" -eq 0 ] || fail "the sandbox ended with ${status}"
-grep -qi panicked "${scratch}/log" && fail "something panicked"
+! grep -qi panicked "${scratch}/log" || fail "something panicked"
 test -s "${scratch}/config/bevy_weathering/settings.ron" || fail "settings were not remembered"
+test -s "${out}/saved/state.ron" || fail "the scene was not saved"
+"${weathering}" replay "${scene}" --no-render --resume "${out}/saved" >"${scratch}/report" || fail "it cannot be gone on with"
 echo "smoke: ${shots} pictures in ${out}"

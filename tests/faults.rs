@@ -8,7 +8,7 @@ use std::fs::{self, File};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use bevy_weathering::save::SavedScene;
 use serde_json::Value;
@@ -135,6 +135,48 @@ fn killed_at_any_moment_it_leaves_no_half_files_and_starts_again() {
     run(replay(&file, "--no-render --resume").arg(&kept)).assert_success();
 }
 
+#[test]
+fn killed_in_the_middle_of_a_save_it_keeps_a_whole_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = scene(folder.path());
+    let kept = folder.path().join("kept");
+    let command = || {
+        let mut command = replay(&file, "--no-render --save-state");
+        command.arg(&kept);
+        command
+    };
+    run(&mut command()).assert_success();
+    // What is being written, as long as it has not been moved to its place.
+    let unfinished = || {
+        let mut entries = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path());
+        entries.find(|path| is_temporary(&path.file_name().unwrap().to_string_lossy()))
+    };
+    let has_files =
+        |hidden: PathBuf| fs::read_dir(hidden.join("new")).is_ok_and(|mut entries| entries.next().is_some());
+    let mut caught = 0;
+    for _ in 0..5 {
+        if let Some(left) = unfinished() {
+            fs::remove_dir_all(left).unwrap();
+        }
+        let mut child = command().stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        while child.try_wait().unwrap().is_none() {
+            if unfinished().is_some_and(has_files) {
+                child.kill().unwrap();
+                break;
+            }
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        child.wait().unwrap();
+        caught += u32::from(unfinished().is_some_and(has_files));
+        assert_eq!(SavedScene::read(&kept).unwrap().tick(), 30);
+        assert_whole(&kept);
+    }
+    assert!(caught > 0, "it was never killed while it saved");
+    run(&mut command()).assert_success();
+    assert_eq!(unfinished(), None);
+    assert_eq!(SavedScene::read(&kept).unwrap().tick(), 30);
+}
+
 /// Moments that are too short to be hit by chance.
 #[test]
 fn a_scene_that_was_about_to_be_moved_is_found_and_what_was_left_is_removed() {
@@ -223,6 +265,7 @@ fn a_full_disk_is_told_and_holds_no_half_files() {
     let outcome = run(replay(&file, "--no-render --out").arg(&out));
     assert_failed(&outcome, &["error: ", "out/maps/", "No space left"]);
     assert_whole(&out);
+    assert_eq!(leftovers(&out), Vec::<String>::new());
     assert!(!out.join("report.json").exists());
     fs::remove_dir_all(&out).unwrap();
     let outcome = run(replay(&file, "--no-render --save-state").arg(&kept));

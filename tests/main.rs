@@ -15,6 +15,8 @@ mod export {
     mod rules;
     mod scene;
 }
+/// The same numbers however they are computed.
+mod digests;
 /// What goes wrong around the program: it is killed, the disk is full, nothing can be drawn.
 mod faults;
 /// Ten thousand spoilt files.
@@ -32,6 +34,8 @@ mod gpu {
     mod hnat;
     /// What must look the same, and what must not.
     mod images;
+    /// A device that is lost.
+    mod lost;
     /// Maps from afar.
     mod mips;
     /// Lights, cameras, meshes.
@@ -63,6 +67,8 @@ mod pool;
 mod posed;
 /// What they refuse.
 mod refusals;
+/// Files of effects that change while they are in use.
+mod reload;
 /// The program as its users run it: output, errors, exit codes.
 mod replay;
 /// Scenes that are saved and gone on with, and accounts of all water.
@@ -84,4 +90,15 @@ mod wetmap;
 /// Water in and on surfaces.
 mod wetting;
 /// The sandbox in a real window, with real keys.
-mod window;
+mod window {
+    /// Keys and mouse.
+    mod keys;
+    /// Leaving while a scene is saved.
+    mod leave;
+    /// More particles than the machine can do.
+    mod overload;
+    /// A virtual screen, and a program on it.
+    mod screen;
+    /// The first picture, and files that change.
+    mod start;
+}

@@ -11,7 +11,7 @@ use bevy::render::renderer::RenderDevice;
 use bevy::tasks::block_on;
 use bevy::world_serialization::WorldSerializationPlugin;
 
-use super::{ReplayError, ReplayOptions};
+use super::{ReplayError, ReplayOptions, failure};
 use crate::WeatheringPlugins;
 use crate::offscreen;
 use crate::overlay::{CpuOverlayPlugin, GpuOverlayPlugin};
@@ -56,7 +56,7 @@ pub(super) fn build(options: &ReplayOptions, scenario: ScenarioPlugin) -> App {
     if options.render {
         app = App::new();
         app.add_plugins(offscreen::plugins().set(tasks).set(assets))
-            .add_plugins(WeatheringPlugins)
+            .add_plugins((WeatheringPlugins, failure::plugin))
             .insert_resource(options.splats);
     } else {
         app = headless(tasks, assets);
@@ -87,14 +87,4 @@ pub(crate) fn headless(tasks: TaskPoolPlugin, assets: AssetPlugin) -> App {
         .add_plugins(WeatheringPlugins.build().disable::<GpuOverlayPlugin>())
         .add_plugins(CpuOverlayPlugin);
     app
-}
-
-/// Blocks until the GPU has done all it was given.
-pub(super) fn wait_for_gpu(world: &World) {
-    if let Some(device) = world.get_resource::<RenderDevice>()
-        && let Err(error) =
-            device.wgpu_device().poll(PollType::Wait { submission_index: None, timeout: None })
-    {
-        error!("the graphics device stopped answering: {error}");
-    }
 }

@@ -17,6 +17,7 @@
 
 mod app;
 mod capture;
+mod failure;
 mod files;
 mod maps;
 mod plot;
@@ -43,6 +44,7 @@ use crate::schedule::TickHold;
 pub(crate) use app::headless;
 pub use app::{require_adapter, task_pools};
 pub use capture::write_png;
+pub use failure::describe_render_error;
 pub use files::{DONE_FILE, write_atomic};
 pub(crate) use maps::write_maps;
 pub use maps::{SurfaceMaps, without_padding};
@@ -147,6 +149,9 @@ pub enum ReplayError {
     /// A picture or a map could not be written.
     #[error(transparent)]
     Picture(#[from] PictureError),
+    /// The graphics driver failed in the middle: the device was lost, or refused what it was given.
+    #[error("{0}; nothing can be drawn any more")]
+    Renderer(String),
     /// The renderer did not answer.
     #[error("gave up after {seconds} s waiting for {what}")]
     TimedOut {
@@ -431,8 +436,9 @@ impl<'a> Run<'a> {
     fn step(&mut self, ticks: u32) -> Result<(), ReplayError> {
         self.app.insert_resource(TimeUpdateStrategy::FixedTimesteps(ticks));
         self.app.update();
+        failure::check(self.app.world())?;
         if self.options.render {
-            app::wait_for_gpu(self.app.world());
+            failure::wait_for_gpu(self.app.world())?;
         }
         self.write_captures()
     }

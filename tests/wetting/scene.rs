@@ -17,8 +17,13 @@ pub struct Scene(pub App);
 
 impl Scene {
     pub fn new(hz: u32) -> Self {
+        Self::with_assets(hz, AssetPlugin::default())
+    }
+
+    /// The same with files of its own.
+    pub fn with_assets(hz: u32, assets: AssetPlugin) -> Self {
         let mut app = App::new();
-        app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default(), MeshPlugin))
+        app.add_plugins((MinimalPlugins, TransformPlugin, assets, MeshPlugin))
             .add_plugins(WeatheringPlugins.set(ClockPlugin { hz }))
             .add_plugins(CpuOverlayPlugin)
             .insert_resource(TimeUpdateStrategy::FixedTimesteps(0));

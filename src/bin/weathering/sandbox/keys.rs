@@ -19,6 +19,7 @@ const KEYS: &[(&str, &str)] = &[
     ("H, I", "hose, probe"),
     ("1 2 3 4", "brushes: wet, dry, dirty, clean"),
     ("Ctrl+Z", "take a stroke back"),
+    ("Ctrl+S", "save the scene"),
     ("Space", "pause, go on"),
     ("N", "one tick"),
     (", .", "time half, twice as fast"),
@@ -33,24 +34,12 @@ const KEYS: &[(&str, &str)] = &[
 ];
 
 pub fn plugin(app: &mut App) {
-    app.add_systems(Update, (reset, leave, choose).run_if(keyboard_is_free));
+    app.add_systems(Update, (reset, choose).run_if(keyboard_is_free));
 }
 
 fn reset(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
     if keys.just_pressed(KeyCode::KeyR) {
         commands.queue(start_over);
-    }
-}
-
-fn leave(keys: Res<ButtonInput<KeyCode>>, mut help: ResMut<Help>, mut exit: MessageWriter<AppExit>) {
-    if !keys.just_pressed(KeyCode::Escape) {
-        return;
-    }
-    // What is in front goes first.
-    if help.0 {
-        help.0 = false;
-    } else {
-        exit.write(AppExit::Success);
     }
 }
 

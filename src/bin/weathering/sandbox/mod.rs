@@ -10,6 +10,7 @@ mod emitters;
 mod heat;
 mod hose;
 mod keys;
+mod leave;
 mod maps;
 mod materials;
 mod model;
@@ -17,6 +18,7 @@ mod open;
 mod pace;
 mod plots;
 mod probe;
+mod reveal;
 mod saving;
 mod scenes;
 mod selection;
@@ -34,6 +36,7 @@ mod weather;
 mod widgets;
 
 use std::error::Error;
+use std::time::Instant;
 
 use bevy::asset::{AssetPlugin, UnapprovedPathMode};
 use bevy::light::DirectionalLightShadowMap;
@@ -51,27 +54,27 @@ use bevy_weathering::scenario::{AssetTree, ScenarioPlugin};
 use crate::cli::SandboxArgs;
 
 pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
+    let begun = reveal::Begun(Instant::now());
     let loaded = open::load(&arguments.file, arguments.variant.as_deref())?;
     require_adapter()?;
     if cfg!(target_os = "linux") && std::env::var_os("DISPLAY").is_none() {
         return Err("no display: DISPLAY is not set; use `weathering replay`, or start one (Xvfb)".into());
     }
     let scenario = ScenarioPlugin::new(loaded.clone(), true)?;
-    let window = Window { title: "weathering".into(), resolution: (1280, 720).into(), ..default() };
+    // Seen when there is something to be seen in it.
+    let window =
+        Window { title: "weathering".into(), resolution: (1280, 720).into(), visible: false, ..default() };
+    // Closing the window is leaving, which may have to wait.
+    let windows = WindowPlugin { primary_window: Some(window), close_when_requested: false, ..default() };
     let mut app = App::new();
-    app.add_plugins(
-        DefaultPlugins
-            .set(task_pools(None))
-            .set(WindowPlugin { primary_window: Some(window), ..default() })
-            .set(AssetPlugin {
-                file_path: loaded.tree.to_string_lossy().into_owned(),
-                // Effects, stamps and pictures follow their files while one works on them.
-                watch_for_changes_override: Some(true),
-                // Scenes that are opened later may lie elsewhere. Each is kept within its own tree before it is shown.
-                unapproved_path_mode: UnapprovedPathMode::Allow,
-                ..default()
-            }),
-    )
+    app.add_plugins(DefaultPlugins.set(task_pools(None)).set(windows).set(AssetPlugin {
+        file_path: loaded.tree.to_string_lossy().into_owned(),
+        // Effects, stamps and pictures follow their files while one works on them.
+        watch_for_changes_override: Some(true),
+        // Scenes that are opened later may lie elsewhere. Each is kept within its own tree before it is shown.
+        unapproved_path_mode: UnapprovedPathMode::Allow,
+        ..default()
+    }))
     .add_plugins(WeatheringPlugins)
     .insert_resource(LiveBudget { frame_ms: pace::BUDGET_MS, ..default() })
     .add_plugins((LiveBudgetPlugin, StageTimesPlugin))
@@ -88,10 +91,19 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
     let exit = app
         .insert_resource(open::Opened { loaded, is_model, effects })
         .insert_resource(shots::OutFolder(arguments.out.clone()))
+        .insert_resource(begun)
         .add_plugins((ui::plugin, settings::plugin, selection::plugin, camera::plugin))
         // In the order of their panels.
         .add_plugins((hose_and_time, scene_panels))
-        .add_plugins((keys::plugin, title::plugin, open::plugin, model::plugin, saving::plugin))
+        .add_plugins((
+            keys::plugin,
+            title::plugin,
+            open::plugin,
+            model::plugin,
+            saving::plugin,
+            leave::plugin,
+            reveal::plugin,
+        ))
         .add_systems(PreUpdate, spare_software_renderers)
         .add_systems(Update, tell_of_reloads)
         .run();

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use bevy::prelude::*;
 use bevy::render::gpu_readback::{Readback, ReadbackComplete};
-use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+use bevy::tasks::{AsyncComputeTaskPool, Task, block_on, futures::check_ready};
 use bevy_egui::egui;
 use bevy_weathering::clock::ShownTime;
 use bevy_weathering::overlay::{Overlays, SplatQueue, SplatStats};
@@ -18,10 +18,11 @@ use bevy_weathering::save::{ColorMaps, SaveError, SavedScene};
 use bevy_weathering::scenario::{LoadedScenario, ScenarioStatus, ScenarioSurface, reset_scenario};
 
 use super::hose::InHand;
+use super::leave::Leaving;
 use super::open::Opened;
 use super::shots::OutFolder;
 use super::split::Split;
-use super::ui::Note;
+use super::ui::{Note, keyboard_is_free};
 use super::weather::OwnRain;
 
 /// Frames between pausing and reading, in which the last splats are painted.
@@ -33,7 +34,7 @@ struct Folder(Option<String>);
 
 /// A scene that is being saved, or gone on with.
 #[derive(Resource, Default)]
-struct Saving(Option<Step>);
+pub struct Saving(Option<Step>);
 
 enum Step {
     /// So many frames until the maps are read.
@@ -47,7 +48,54 @@ enum Step {
 }
 
 pub fn plugin(app: &mut App) {
-    app.init_resource::<Folder>().init_resource::<Saving>().add_systems(Update, advance);
+    app.init_resource::<Folder>()
+        .init_resource::<Saving>()
+        .add_systems(Update, (press.run_if(keyboard_is_free), advance).chain());
+}
+
+impl Saving {
+    /// A scene is on its way to the disk.
+    pub fn is_saving(&self) -> bool {
+        matches!(self.0, Some(Step::Settling { .. } | Step::Reading { .. } | Step::Writing { .. }))
+    }
+
+    /// Waits for what is being written; what is not that far yet is given up.
+    pub fn finish(&mut self) {
+        if let Some(Step::Writing { folder, task }) = self.0.take() {
+            match block_on(task) {
+                Ok(()) => info!("saved {}", folder.display()),
+                Err(error) => error!("{error}"),
+            }
+        }
+    }
+}
+
+fn press(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
+    let control = keys.any_pressed([KeyCode::ControlLeft, KeyCode::ControlRight]);
+    if control && keys.just_pressed(KeyCode::KeyS) {
+        commands.queue(save);
+    }
+}
+
+/// The folder that is named in the panel, or the one that is there at first.
+fn named_folder(world: &World) -> String {
+    let first = || world.resource::<OutFolder>().0.join("saved").to_string_lossy().into_owned();
+    world.resource::<Folder>().0.clone().unwrap_or_else(first)
+}
+
+/// As the button does, where there is one.
+fn save(world: &mut World) {
+    let is_ready = matches!(*world.resource::<ScenarioStatus>(), ScenarioStatus::Ready);
+    if !is_ready || world.resource::<Saving>().0.is_some() {
+        return;
+    }
+    match obstacle(world) {
+        Some(why) => world.resource_mut::<Note>().complain(why),
+        None => {
+            let folder = named_folder(world);
+            begin(world, Path::new(folder.trim()));
+        }
+    }
 }
 
 /// Why the scene cannot be saved as it is.
@@ -72,8 +120,7 @@ fn obstacle(world: &mut World) -> Option<&'static str> {
 /// Buttons to save and to go on.
 pub fn show(ui: &mut egui::Ui, world: &mut World) {
     ui.heading("The scene");
-    let default = world.resource::<OutFolder>().0.join("saved").to_string_lossy().into_owned();
-    let mut folder = world.resource::<Folder>().0.clone().unwrap_or(default);
+    let mut folder = named_folder(world);
     ui.horizontal(|ui| {
         ui.label("folder");
         ui.text_edit_singleline(&mut folder);
@@ -95,7 +142,7 @@ pub fn show(ui: &mut egui::Ui, world: &mut World) {
             ui.label(why);
         }
         None => {
-            if ui.button("Save").on_hover_text("Replaces what was saved there").clicked() {
+            if ui.button("Save").on_hover_text("Replaces what was saved there (Ctrl+S)").clicked() {
                 begin(world, &path);
             }
         }
@@ -208,6 +255,10 @@ fn advance(world: &mut World) {
         Step::Writing { folder, mut task } => match check_ready(&mut task) {
             None => Some(Step::Writing { folder, task }),
             Some(written) => {
+                if written.is_err() {
+                    // There may be another folder to save it into.
+                    world.resource_mut::<Leaving>().0 = false;
+                }
                 let mut note = world.resource_mut::<Note>();
                 match written {
                     Ok(()) => note.tell(format!("saved {}", folder.display())),
@@ -233,4 +284,78 @@ fn write(world: &mut World, folder: PathBuf, maps: Vec<[Option<Vec<u8>>; 3]>) ->
     let to = folder.clone();
     let task = AsyncComputeTaskPool::get().spawn(async move { scene.write(&to) });
     Step::Writing { folder, task }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::window::WindowCloseRequested;
+
+    use super::super::leave;
+    use super::super::ui::UiInput;
+    use super::*;
+
+    fn app() -> App {
+        let mut app = App::new();
+        app.add_message::<WindowCloseRequested>()
+            .init_resource::<ButtonInput<KeyCode>>()
+            .init_resource::<UiInput>()
+            .init_resource::<Note>()
+            .init_resource::<Saving>();
+        leave::plugin(&mut app);
+        app
+    }
+
+    fn close(app: &mut App) {
+        app.world_mut().write_message(WindowCloseRequested { window: Entity::PLACEHOLDER });
+        app.update();
+    }
+
+    fn settling() -> Saving {
+        Saving(Some(Step::Settling { folder: "saved".into(), frames: SETTLE }))
+    }
+
+    #[test]
+    fn a_window_that_is_closed_while_a_scene_is_saved_stays_until_it_is() {
+        let mut app = app();
+        app.insert_resource(settling());
+        close(&mut app);
+        for _ in 0..3 {
+            assert_eq!(app.should_exit(), None);
+            app.update();
+        }
+        app.insert_resource(Saving(None));
+        app.update();
+        assert_eq!(app.should_exit(), Some(AppExit::Success));
+    }
+
+    #[test]
+    fn who_insists_leaves_at_once_and_without_anything_to_save_so_does_everyone() {
+        for (saving, times) in [(settling(), 2), (Saving(None), 1)] {
+            let mut app = app();
+            app.insert_resource(saving);
+            for _ in 0..times {
+                assert_eq!(app.should_exit(), None);
+                close(&mut app);
+            }
+            assert_eq!(app.should_exit(), Some(AppExit::Success));
+        }
+    }
+
+    #[test]
+    fn the_program_does_not_end_before_a_file_that_is_being_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("late");
+        let to = file.clone();
+        let pool = AsyncComputeTaskPool::get_or_init(Default::default);
+        let task = pool.spawn(async move {
+            std::thread::sleep(std::time::Duration::from_millis(200));
+            std::fs::write(to, "whole").map_err(|source| SaveError::Write { path: "late".into(), source })
+        });
+        let mut app = app();
+        app.insert_resource(Saving(Some(Step::Writing { folder: folder.path().into(), task })));
+        // In the way of a signal or a lost device, which wait for nothing.
+        app.world_mut().write_message(AppExit::error());
+        app.update();
+        assert_eq!(std::fs::read_to_string(file).unwrap(), "whole");
+    }
 }

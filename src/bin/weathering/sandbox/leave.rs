@@ -1,0 +1,90 @@
+//! Leaving: by the key, by the window's button, or because nothing can be drawn any more. Never while a scene is on its way to the
+//! disk.
+
+use bevy::prelude::*;
+use bevy::render::error_handler::{RenderError, RenderErrorHandler, RenderErrorPolicy};
+use bevy::window::WindowCloseRequested;
+use bevy_weathering::replay::describe_render_error;
+
+use super::saving::Saving;
+use super::ui::{Help, Note, keyboard_is_free};
+
+/// The program ends as soon as nothing is being saved.
+#[derive(Resource, Default)]
+pub struct Leaving(pub bool);
+
+pub fn plugin(app: &mut App) {
+    app.init_resource::<Leaving>()
+        .insert_resource(RenderErrorHandler(give_up))
+        .add_systems(Update, (press.run_if(keyboard_is_free), close).chain())
+        .add_systems(PostUpdate, leave)
+        .add_systems(Last, finish_writing);
+}
+
+fn press(
+    keys: Res<ButtonInput<KeyCode>>,
+    mut help: ResMut<Help>,
+    mut leaving: ResMut<Leaving>,
+    mut exit: MessageWriter<AppExit>,
+) {
+    if !keys.just_pressed(KeyCode::Escape) {
+        return;
+    }
+    // What is in front goes first.
+    if help.0 {
+        help.0 = false;
+    } else {
+        ask(&mut leaving, &mut exit);
+    }
+}
+
+fn close(
+    mut closed: MessageReader<WindowCloseRequested>,
+    mut leaving: ResMut<Leaving>,
+    mut exit: MessageWriter<AppExit>,
+) {
+    if closed.read().count() > 0 {
+        ask(&mut leaving, &mut exit);
+    }
+}
+
+/// Whoever asks a second time does not want to wait for maps that may never come.
+fn ask(leaving: &mut Leaving, exit: &mut MessageWriter<AppExit>) {
+    if leaving.0 {
+        exit.write(AppExit::Success);
+    }
+    leaving.0 = true;
+}
+
+fn leave(
+    leaving: Res<Leaving>,
+    saving: Res<Saving>,
+    mut note: ResMut<Note>,
+    mut exit: MessageWriter<AppExit>,
+) {
+    if !leaving.0 {
+        return;
+    }
+    if !saving.is_saving() {
+        exit.write(AppExit::Success);
+    } else if leaving.is_changed() {
+        note.tell("leaves when the scene is saved");
+    }
+}
+
+/// However it ends: the thread that writes would end with the program.
+fn finish_writing(mut exits: MessageReader<AppExit>, mut saving: ResMut<Saving>) {
+    if exits.read().count() > 0 {
+        saving.finish();
+    }
+}
+
+/// Ends the program in place of showing the same picture for ever. No schedule runs any more after that.
+fn give_up(error: &RenderError, main_world: &mut World, _render_world: &mut World) -> RenderErrorPolicy {
+    error!("{}; nothing can be drawn any more", describe_render_error(error));
+    if let Some(mut saving) = main_world.get_resource_mut::<Saving>() {
+        saving.finish();
+    }
+    main_world.write_message(AppExit::error());
+    RenderErrorPolicy::StopRendering
+}
