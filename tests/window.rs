@@ -159,6 +159,11 @@ fn keys_pause_start_over_take_pictures_and_leave() {
     let turned = take();
     xdotool(&["mousemove", "100", "250", "mousedown", "3", "mousemove_relative", "60", "20", "mouseup", "3"]);
     assert!(take().as_raw() == turned.as_raw(), "the camera turned over a panel");
+    // Exported as it is; the report comes last.
+    xdotool(&["key", "x"]);
+    let exported = out.join("export_000");
+    wait_for("the export", || exported.join("report.json").exists().then_some(()));
+    assert!(exported.join("floor_weathered.glb").is_file() && exported.join("maps/floor_film.png").is_file());
     xdotool(&["key", "Escape"]);
     let status = wait_for("the end", || sandbox.0.try_wait().unwrap());
     assert!(status.success(), "{status}");

@@ -6,6 +6,7 @@ mod brush;
 mod camera;
 mod effects;
 mod emitters;
+mod export;
 mod hose;
 mod keys;
 mod maps;
@@ -85,7 +86,14 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
         .add_plugins((ui::plugin, settings::plugin, selection::plugin, camera::plugin))
         // In the order of their panels.
         .add_plugins((hose_and_time, scene_panels))
-        .add_plugins((keys::plugin, title::plugin, open::plugin, model::plugin, saving::plugin))
+        .add_plugins((
+            keys::plugin,
+            title::plugin,
+            open::plugin,
+            model::plugin,
+            saving::plugin,
+            export::plugin,
+        ))
         .add_systems(PreUpdate, spare_software_renderers)
         .add_systems(Update, tell_of_reloads)
         .run();

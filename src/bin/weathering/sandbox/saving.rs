@@ -17,6 +17,7 @@ use bevy_weathering::replay::without_padding;
 use bevy_weathering::save::{ColorMaps, SaveError, SavedScene};
 use bevy_weathering::scenario::{LoadedScenario, ScenarioStatus, ScenarioSurface, reset_scenario};
 
+use super::export;
 use super::hose::InHand;
 use super::open::Opened;
 use super::shots::OutFolder;
@@ -50,6 +51,11 @@ pub fn plugin(app: &mut App) {
     app.init_resource::<Folder>().init_resource::<Saving>().add_systems(Update, advance);
 }
 
+/// Whether a scene is being saved, or gone on with.
+pub fn is_busy(world: &World) -> bool {
+    world.resource::<Saving>().0.is_some()
+}
+
 /// Why the scene cannot be saved as it is.
 fn obstacle(world: &mut World) -> Option<&'static str> {
     let opened = world.resource::<Opened>();
@@ -80,7 +86,7 @@ pub fn show(ui: &mut egui::Ui, world: &mut World) {
     });
     let path = PathBuf::from(folder.trim());
     world.resource_mut::<Folder>().0 = Some(folder);
-    if world.resource::<Saving>().0.is_some() {
+    if is_busy(world) || export::is_reading(world) {
         ui.horizontal(|ui| {
             ui.spinner();
             ui.label("at work");
