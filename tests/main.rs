@@ -11,9 +11,24 @@ mod common;
 /// Scenes with the weathering baked in.
 mod export {
     mod bake;
+    /// The present state of running apps.
+    mod live;
+    /// Skins, animations and morph targets.
+    mod moving;
+    /// Scenarios at their end.
+    mod replay;
     /// The rules of the format.
     mod rules;
     mod scene;
+
+    /// Writes a scene, before and after, into the folder that `WEATHERING_EXPORTS` names, for validators of others.
+    fn keep(name: &str, before: &[u8], after: &[u8]) {
+        let Some(folder) = std::env::var_os("WEATHERING_EXPORTS") else { return };
+        let folder = std::path::PathBuf::from(folder);
+        std::fs::create_dir_all(&folder).unwrap();
+        std::fs::write(folder.join(format!("{name}_dry.glb")), before).unwrap();
+        std::fs::write(folder.join(format!("{name}_weathered.glb")), after).unwrap();
+    }
 }
 /// The same numbers however they are computed.
 mod digests;
@@ -25,6 +40,8 @@ mod fuzz;
 mod gpu {
     /// Small apps that render without a window.
     pub mod app;
+    /// Exported scenes in a renderer that knows nothing of weathering.
+    mod exported;
     /// Ticks and frames.
     mod frames;
     /// No light out of nothing.
@@ -85,6 +102,8 @@ mod timeline;
 mod tools;
 /// Meshes whose texture coordinates lie on each other.
 mod unwrap;
+/// Videos by the ffmpeg of this machine.
+mod video;
 /// Wet maps, made as their users make them.
 mod wetmap;
 /// Water in and on surfaces.

@@ -25,7 +25,7 @@ const CELLS: [u16; 2] = [40, 8];
 
 /// A plank from 0 to 2 along x, 0.4 m wide, that faces up. u grows along x, v along z. Its second joint sits at x = 1 and bends
 /// 0.4 m of it.
-fn plank() -> Mesh {
+pub fn plank() -> Mesh {
     let [long, wide] = CELLS;
     let (mut positions, mut uvs, mut weights, mut indices) = (vec![], vec![], vec![], vec![]);
     for column in 0..=long {
@@ -58,13 +58,13 @@ fn second_weight(uv: Vec2) -> f32 {
 }
 
 /// Where a point of the plank is, with its first joint where `root` is and the second turned like this.
-fn posed(uv: Vec2, [root, second]: [Transform; 2]) -> Vec3 {
+pub fn posed(uv: Vec2, [root, second]: [Transform; 2]) -> Vec3 {
     let (rest, weight) = (at_rest(uv), second_weight(uv));
     root.transform_point(rest) * (1.0 - weight) + second.transform_point(rest - Vec3::X) * weight
 }
 
 /// Joints of a plank that begins at `root` and hangs straight down from its middle on.
-fn hanging(root: Vec3) -> [Transform; 2] {
+pub fn hanging(root: Vec3) -> [Transform; 2] {
     let second = Transform::from_translation(root + Vec3::X);
     [Transform::from_translation(root), second.with_rotation(Quat::from_rotation_z(-FRAC_PI_2))]
 }
@@ -74,7 +74,7 @@ fn straight(root: Vec3) -> [Transform; 2] {
 }
 
 /// Gives a surface joints, which it follows from now on.
-fn skin(scene: &mut Scene, surface: Entity, joints: [Transform; 2]) -> [Entity; 2] {
+pub fn skin(scene: &mut Scene, surface: Entity, joints: [Transform; 2]) -> [Entity; 2] {
     let world = scene.0.world_mut();
     let entities = joints.map(|joint| world.spawn((joint, GlobalTransform::from(joint))).id());
     let bind_poses = vec![Mat4::IDENTITY, Mat4::from_translation(Vec3::NEG_X)];
@@ -93,12 +93,12 @@ fn move_joints(scene: &mut Scene, joints: [Entity; 2], to: [Transform; 2]) {
     scene.run(1);
 }
 
-fn glazed() -> PorousMaterial {
+pub fn glazed() -> PorousMaterial {
     PorousMaterial { capacity_mm: 0.0, retained_mm: 0.05, ..default() }
 }
 
 /// Runs frames without ticks until something is there that is worked out in the background.
-fn wait_for(scene: &mut Scene, what: &str, is_there: impl Fn(&World) -> bool) {
+pub fn wait_for(scene: &mut Scene, what: &str, is_there: impl Fn(&World) -> bool) {
     for _ in 0..20_000 {
         if is_there(scene.0.world()) {
             return;

@@ -135,6 +135,15 @@ impl Document {
 
     /// Adds vectors of floats for vertices; the number of their accessor.
     pub(super) fn push_floats<const N: usize>(&mut self, values: &[[f32; N]]) -> usize {
+        self.push_vectors(values, false)
+    }
+
+    /// The same of positions, whose bounds a reader is told.
+    pub(super) fn push_points(&mut self, values: &[[f32; 3]]) -> usize {
+        self.push_vectors(values, true)
+    }
+
+    fn push_vectors<const N: usize>(&mut self, values: &[[f32; N]], bounded: bool) -> usize {
         self.push_elements(&Elements {
             kind: 5126,
             normalized: false,
@@ -142,7 +151,7 @@ impl Document {
             parts: N,
             count: values.len(),
             bytes: values.iter().flatten().flat_map(|value| value.to_le_bytes()).collect(),
-            bounded: false,
+            bounded,
         })
     }
 

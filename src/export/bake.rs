@@ -10,6 +10,7 @@ use super::paint::{self, Source};
 use super::scene::Place;
 use super::shape::Shape;
 use super::simulate::{Exposed, simulate};
+use super::soaked::Soaked;
 use super::texture::Pictures;
 use super::write::Writer;
 use super::{BakedSurface, ExportError, ExportOptions, ExportReport};
@@ -35,10 +36,10 @@ pub struct Export {
 }
 
 /// A primitive that a node shows, with all that is needed of it.
-struct Surface {
-    place: Place,
-    shape: Arc<Shape>,
-    source: Source,
+pub(super) struct Surface {
+    pub(super) place: Place,
+    pub(super) shape: Arc<Shape>,
+    pub(super) source: Source,
 }
 
 /// Lets it rain on the scene of a `.gltf` or `.glb`, and bakes what that leaves.
@@ -72,20 +73,30 @@ pub fn bake(
     let places: Vec<_> = surfaces.iter().map(|surface| &surface.place).collect();
     let mut writer = Writer::new(document, &places);
     let mut rows = Vec::new();
-    for (Surface { place, shape, source }, (soaked, maps)) in
-        surfaces.iter().zip(outcome.surfaces.iter().zip(&outcome.maps))
-    {
-        let size = texture_size(source, options);
-        let baked = paint::bake(shape, source, &model, &soaked.held, maps.size, size);
-        let sampler = writer.sampler;
-        let textures = writer.document.push_textures(&place.name, &baked, sampler)?;
-        let amounts = writer.document.push_amounts(maps)?;
-        writer.add(place, shape, textures, amounts)?;
-        rows.push(BakedSurface::new(place, shape, soaked, maps, size));
+    for (surface, (soaked, maps)) in surfaces.iter().zip(outcome.surfaces.iter().zip(&outcome.maps)) {
+        let size = texture_size(&surface.source, options.texture_size, options.map_size);
+        rows.push(write_wet(&mut writer, surface, &model, soaked, maps, size)?);
     }
     let scene = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let report = ExportReport::new(scene, options, &outcome, rows);
     Ok(Export { glb: writer.document.to_glb()?, maps: outcome.maps, report })
+}
+
+/// Bakes the wet look of a surface into textures of `size`, and writes its wet form.
+pub(super) fn write_wet(
+    writer: &mut Writer,
+    Surface { place, shape, source }: &Surface,
+    model: &WetModel,
+    soaked: &Soaked,
+    maps: &SurfaceMaps,
+    size: u32,
+) -> Result<BakedSurface, ExportError> {
+    let baked = paint::bake(shape, source, model, &soaked.held, maps.size, size);
+    let sampler = writer.sampler;
+    let textures = writer.document.push_textures(&place.name, &baked, sampler)?;
+    let amounts = writer.document.push_amounts(maps)?;
+    writer.add(place, shape, textures, amounts)?;
+    Ok(BakedSurface::new(place, shape, soaked, maps, size))
 }
 
 /// All surfaces of a scene. Primitives without area are left out.
@@ -117,12 +128,12 @@ fn surfaces(document: &Document, options: &ExportOptions) -> Result<Vec<Surface>
     if surfaces.is_empty() { Err(ExportError::NoMesh { path: path() }) } else { Ok(surfaces) }
 }
 
-/// Texels along each side of the textures of a surface.
-fn texture_size(source: &Source, options: &ExportOptions) -> u32 {
-    options.texture_size.unwrap_or_else(|| {
+/// Texels along each side of the textures of a surface with maps of this size.
+pub(super) fn texture_size(source: &Source, wanted: Option<u32>, map_size: u32) -> u32 {
+    wanted.unwrap_or_else(|| {
         let maps = [&source.color_map, &source.surface_map, &source.normal_map].into_iter().flatten();
         let largest = maps.map(|map| map.picture.width.max(map.picture.height)).max().unwrap_or(0);
-        largest.clamp(options.map_size.min(MAX_USUAL_TEXTURE), MAX_USUAL_TEXTURE)
+        largest.clamp(map_size.min(MAX_USUAL_TEXTURE), MAX_USUAL_TEXTURE)
     })
 }
 

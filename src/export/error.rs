@@ -23,6 +23,22 @@ pub enum ExportError {
         /// The file.
         path: PathBuf,
     },
+    /// The world has no surfaces.
+    #[error("{}: there is no surface to export", .path.display())]
+    NoSurface {
+        /// What the scene is called.
+        path: PathBuf,
+    },
+    /// The look of a surface cannot be written.
+    #[error("{}: `{surface}` {reason}", .path.display())]
+    Look {
+        /// What the scene is called.
+        path: PathBuf,
+        /// Its name.
+        surface: String,
+        /// Why.
+        reason: String,
+    },
     /// Its texture coordinates are not unique, and cannot be made so.
     #[error("{}: `{surface}`: {source}", .path.display())]
     Unwrap {

@@ -78,7 +78,8 @@ impl Document {
         Ok(WetTextures { color, surface, normal })
     }
 
-    fn push_texture(
+    /// Adds a texture; its number.
+    pub(super) fn push_texture(
         &mut self,
         name: &str,
         picture: &DynamicImage,

@@ -10,6 +10,8 @@
 //! ([`unwrap`](crate::unwrap)) that become its next `TEXCOORD_`, and what the material's own textures show is drawn anew there;
 //! those textures keep the uvs that they had. Instances of one mesh share their vertices, not their materials.
 //!
+//! [`Snapshot`] is the same for a running app: its surfaces as they are now, wherever their meshes come from.
+//!
 //! No graphics driver is needed, and nothing is written before all of it is made.
 //!
 //! # Limits
@@ -25,6 +27,7 @@ mod accessor;
 mod bake;
 mod document;
 mod error;
+mod live;
 mod look;
 mod material;
 mod options;
@@ -35,10 +38,12 @@ mod report;
 mod scene;
 mod shape;
 mod simulate;
+mod soaked;
 mod texture;
 mod write;
 
 pub use bake::{Export, MAX_MAP_TEXELS, bake};
 pub use error::ExportError;
+pub use live::{ColorReadback, Snapshot, SurfaceColors};
 pub use options::ExportOptions;
 pub use report::{BakedSurface, ExportReport};

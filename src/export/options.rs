@@ -73,6 +73,18 @@ impl ExportOptions {
         (f64::from(self.minutes) * 60.0 * f64::from(self.tick_hz)).round().max(1.0) as u32
     }
 
+    /// Checks a size of textures.
+    pub(super) fn check_texture_size(size: Option<u32>) -> Result<(), ExportError> {
+        match size {
+            Some(size) if !(TILE_SIZE..=Self::MAX_TEXTURE_SIZE).contains(&size) => Err(ExportError::Option {
+                option: "texture-size",
+                value: size.to_string(),
+                expected: format!("{TILE_SIZE} to {}", Self::MAX_TEXTURE_SIZE),
+            }),
+            _ => Ok(()),
+        }
+    }
+
     /// Checks all that can be checked without the scene.
     ///
     /// # Errors
@@ -96,7 +108,6 @@ impl ExportOptions {
         }
         let sizes = [
             ("size", self.map_size, TILE_SIZE, Weatherable::MAX_MAP_SIZE),
-            ("texture-size", self.texture_size.unwrap_or(TILE_SIZE), TILE_SIZE, Self::MAX_TEXTURE_SIZE),
             ("hz", self.tick_hz, 1, WeatheringClock::MAX_HZ),
         ];
         for (option, value, least, most) in sizes {
@@ -104,6 +115,7 @@ impl ExportOptions {
                 return Err(wrong(option, value.to_string(), format!("{least} to {most}")));
             }
         }
+        Self::check_texture_size(self.texture_size)?;
         if !self.map_size.is_multiple_of(TILE_SIZE) {
             return Err(wrong("size", self.map_size.to_string(), format!("a multiple of {TILE_SIZE}")));
         }

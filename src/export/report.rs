@@ -5,19 +5,21 @@ use serde::Serialize;
 use super::ExportOptions;
 use super::scene::Place;
 use super::shape::Shape;
-use super::simulate::{Outcome, Soaked};
+use super::simulate::Outcome;
+use super::soaked::Soaked;
 use crate::replay::{ParticleReport, SurfaceMaps, WaterReport};
 
-/// `report.json` of a bake: where all the water is.
+/// `report.json` of an export: where all the water is.
 #[derive(Serialize, Debug, Clone, PartialEq)]
 pub struct ExportReport {
-    /// File name of the scene.
+    /// File name of the scene, or what an app called it.
     pub scene: String,
     /// The seed of the rain.
     pub seed: u64,
-    /// Water on level ground, mm/h.
-    pub rain_mm_per_h: f32,
-    /// m/s.
+    /// Water on level ground, mm/h; `None` of an app that was running, where it came from its own emitters.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rain_mm_per_h: Option<f32>,
+    /// m/s, at the end.
     pub wind: [f32; 3],
     /// Ticks run.
     pub ticks: u32,
@@ -38,7 +40,7 @@ pub struct BakedSurface {
     pub name: String,
     /// Number of its node in the file.
     pub node: usize,
-    /// Number of its mesh in the file that was read.
+    /// Number of its mesh in the file that was read; of an app that was running, in the one that was written.
     pub mesh: usize,
     /// Number of the primitive in that mesh.
     pub primitive: usize,
@@ -80,7 +82,7 @@ impl ExportReport {
         Self {
             scene,
             seed: options.seed,
-            rain_mm_per_h: options.rain_mm_per_h,
+            rain_mm_per_h: Some(options.rain_mm_per_h),
             wind: options.weather.wind.to_array(),
             ticks: outcome.ticks,
             seconds: f64::from(outcome.ticks) / f64::from(options.tick_hz),

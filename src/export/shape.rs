@@ -70,6 +70,17 @@ impl Document {
         Ok(Some(shape))
     }
 
+    /// The shape of a primitive whose maps lie over this set of its uvs, as they are.
+    pub(super) fn shape_over(&self, place: &Place, set: usize) -> Result<Shape, ExportError> {
+        let field = format!("meshes[{}].primitives[{}]", place.mesh, place.primitive);
+        let primitive = &self.entry("meshes", place.mesh)?["primitives"][place.primitive];
+        let shape = self.read_shape(&field, primitive)?;
+        if set >= shape.uvs.len() {
+            return Err(self.content(field, format!("has no `TEXCOORD_{set}`")));
+        }
+        Ok(Shape { unique: set, ..shape })
+    }
+
     fn read_shape(&self, field: &str, primitive: &Value) -> Result<Shape, ExportError> {
         let attributes = &primitive["attributes"];
         let count = match number(&attributes["POSITION"]) {
@@ -152,6 +163,17 @@ impl Shape {
     /// Their number.
     pub(super) fn map_set(&self) -> usize {
         if self.cut.is_some() { self.uvs.len() } else { self.unique }
+    }
+
+    /// Whether they lie in more than one tile, so that a texel is several places.
+    pub(super) fn repeats(&self) -> bool {
+        // So far beyond an edge is not meant.
+        const ROUNDING: f32 = 1e-3;
+        let uvs = self.corners.as_flattened().iter().map(|&corner| self.map_uvs()[corner as usize]);
+        let (low, high) =
+            uvs.fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(low, high), uv| (low.min(uv), high.max(uv)));
+        let tile = ((low + high) / 2.0).floor();
+        (low - tile).min_element() < -ROUNDING || (high - tile).max_element() > 1.0 + ROUNDING
     }
 
     /// For colliders, in the world, with the uvs of the maps alone.
@@ -255,6 +277,14 @@ pub(super) mod tests {
         assert_eq!(triangles(5, &indices), [[0, 1, 2], [1, 3, 2], [2, 3, 4]]);
         assert_eq!(triangles(6, &indices), [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
         assert!(triangles(6, &[]).is_empty());
+    }
+
+    #[test]
+    fn uvs_repeat_that_lie_in_two_tiles() {
+        assert!(!square(1.0).repeats() && square(1.5).repeats());
+        let mut shape = square(1.0);
+        shape.uvs[0].iter_mut().for_each(|uv| *uv -= 3.0);
+        assert!(!shape.repeats());
     }
 
     #[test]

@@ -9,15 +9,14 @@ use bevy::asset::AssetPlugin;
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 
-use super::look::Held;
 use super::rain::{add_rain, bounds};
+use super::soaked::Soaked;
 use super::{ExportError, ExportOptions};
 use crate::clock::{ClockPlugin, WeatheringClock};
 use crate::collision::{ColliderReport, MeshColliders, NotWeatherable, SurfaceCollider, TriangleError};
 use crate::emitter::EmissionSeed;
 use crate::material::PorousMaterial;
-use crate::matter::snow::RELATIVE_DENSITY;
-use crate::matter::{SurfaceMatter, TexelMatter};
+use crate::matter::SurfaceMatter;
 use crate::overlay::{
     CpuMaps, FramesWork, MapBudget, MapLoss, OverlayUv, SurfaceTotals, TexelArea, Weatherable,
 };
@@ -35,15 +34,6 @@ pub(super) struct Exposed {
     /// In the world, its first uvs unique.
     pub(super) mesh: Mesh,
     pub(super) material: PorousMaterial,
-}
-
-/// What has become of one surface.
-pub(super) struct Soaked {
-    pub(super) area_m2: f64,
-    pub(super) triangles: u32,
-    pub(super) totals: SurfaceTotals,
-    /// Texel by texel, also beside the islands.
-    pub(super) held: Vec<Held>,
 }
 
 /// What has become of all.
@@ -162,57 +152,11 @@ fn read(world: &mut World) -> Vec<(Soaked, SurfaceMaps)> {
             )| {
                 let size = maps.texels();
                 let now = Now::new(clock.tick(), clock.hz(), &drying, &geometry.0, exposure, material);
-                let soaked = Soaked {
-                    area_m2: geometry.0.area_mm2().iter().copied().map(f64::from).sum::<f64>() / 1e6,
-                    triangles: collider.0.total,
-                    totals: *totals,
-                    held: held(water, matter, cpu, &now, size),
-                };
-                (
-                    number.0,
-                    (soaked, SurfaceMaps::new(name.to_string(), size, water, matter, *loss, cpu, &now)),
-                )
+                let maps = SurfaceMaps::new(name.to_string(), size, water, matter, *loss, cpu, &now);
+                (number.0, (Soaked::new(&maps, &now, *totals, collider.0.total), maps))
             },
         )
         .collect();
     surfaces.sort_by_key(|(number, _)| *number);
     surfaces.into_iter().map(|(_, surface)| surface).collect()
-}
-
-/// What lies on each texel now, and how it looks.
-fn held(
-    water: &SurfaceWater,
-    matter: &SurfaceMatter,
-    cpu: Option<&CpuMaps>,
-    now: &Now,
-    size: u32,
-) -> Vec<Held> {
-    let channels = |map: &[[u8; 4]], texel: usize| {
-        map.get(texel).map_or([0.0; 4], |texel| texel.map(|channel| f32::from(channel) / 255.0))
-    };
-    let one = |texel: u32| {
-        // Beside an island, what lies at its border.
-        let texel = now.geometry.stand_in(texel).unwrap_or(texel);
-        let index = texel as usize;
-        let mut held = Held::default();
-        if let Some(state) = water.texels().get(index) {
-            let amounts = now.amounts(&now.scale(water.units(), texel), texel, state);
-            let look = now.look(&amounts, state);
-            held.wetness = look.wetness as f32;
-            held.gloss = look.gloss as f32;
-            held.film_mm = (amounts.film_mm * look.film) as f32;
-        }
-        let unit_mm = now.geometry.unit_mm(water.units(), texel);
-        let depth = |units: u32| (f64::from(units) * unit_mm) as f32;
-        let TexelMatter { dust, mud, snow } = matter.texels().get(index).copied().unwrap_or_default();
-        (held.dust_mm, held.mud_mm) = (depth(dust), depth(mud));
-        held.snow_mm = depth(snow) / RELATIVE_DENSITY as f32;
-        if let Some(cpu) = cpu {
-            held.diffuse = channels(&cpu.diffuse, index);
-            held.specular = channels(&cpu.specular, index);
-            held.normal = channels(&cpu.normal, index);
-        }
-        held
-    };
-    (0..size * size).map(one).collect()
 }

@@ -51,7 +51,7 @@ pub(super) struct Texture {
     edges: [Edge; 2],
     /// Which uvs it lies in.
     pub(super) set: usize,
-    texture_from_uv: Affine2,
+    pub(super) texture_from_uv: Affine2,
 }
 
 /// What each byte of a channel stands for.

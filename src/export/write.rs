@@ -84,6 +84,12 @@ impl Writer {
         };
         let keeps_tangents = textures.normal.is_none() || self.normal_set(dry) == set;
         let mesh = self.mesh_of(place);
+        // The dry form needs none: they may serve the wet one.
+        let own_tangents = cut.is_none()
+            && !keeps_tangents
+            && !self.has_dry_normals(&self.document.json["meshes"][mesh]["primitives"][place.primitive]);
+        let tangents = own_tangents.then(|| shape.map_tangents()).flatten();
+        let tangents = tangents.map(|tangents| self.document.push_floats(&tangents));
         let primitive = &mut self.document.json["meshes"][mesh]["primitives"][place.primitive];
         let Some(fields) = primitive.as_object_mut() else { return Ok(()) };
         if let Some((changed, corners)) = cut {
@@ -94,6 +100,11 @@ impl Writer {
             fields.insert("mode".into(), 4.into());
         } else if !keeps_tangents {
             forget_tangents(fields);
+            if let Some(tangents) = tangents
+                && let Some(attributes) = fields.get_mut("attributes").and_then(Value::as_object_mut)
+            {
+                attributes.insert("TANGENT".into(), tangents.into());
+            }
         }
         fields.insert("material".into(), wet.into());
         let [dry_variant, wet_variant] = self.variants;

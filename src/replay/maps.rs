@@ -81,7 +81,7 @@ impl SurfaceMaps {
     }
 
     /// Of a surface that has none.
-    fn none(name: String, surface: &Weatherable, loss: MapLoss, hz: u32) -> Self {
+    pub(crate) fn none(name: String, surface: &Weatherable, loss: MapLoss, hz: u32) -> Self {
         Self {
             name,
             size: 0,

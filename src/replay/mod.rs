@@ -14,9 +14,12 @@
 //! | `plots/*.svg` | these rows as lines |
 //! | `video.mp4` or `video.apng`, `sheet.png` | the pictures, if asked for |
 //! | `report.json` | the numbers at the end; written last |
+//!
+//! The scene as it is at the end can be [exported](crate::export::Snapshot) into a folder of its own, too.
 
 mod app;
 mod capture;
+mod export;
 mod failure;
 mod files;
 mod maps;
@@ -35,6 +38,7 @@ use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 
 use crate::clock::WeatheringClock;
+use crate::export::{Export, ExportError};
 use crate::overlay::{SplatBudget, SplatStats};
 use crate::picture::PictureError;
 use crate::save::{ColorMaps, SaveError, SavedScene};
@@ -86,6 +90,8 @@ pub struct ReplayOptions {
     pub video: bool,
     /// Make a contact sheet of so many pictures, up to [`Self::MAX_SHEET`]. Needs `out` and `render`.
     pub sheet: Option<u32>,
+    /// Folder to [export](Export::write) the scene into as it is at the end. Not `out`, and not in `save`.
+    pub export: Option<PathBuf>,
 }
 
 impl ReplayOptions {
@@ -111,6 +117,7 @@ impl ReplayOptions {
             every: None,
             video: false,
             sheet: None,
+            export: None,
         }
     }
 }
@@ -163,6 +170,9 @@ pub enum ReplayError {
     /// The scene could not be saved or restored.
     #[error(transparent)]
     Save(#[from] SaveError),
+    /// The scene could not be exported.
+    #[error("the export: {0}")]
+    Export(#[source] Box<ExportError>),
     /// The report could not be written as JSON.
     #[error("cannot write the report: {0}")]
     Report(#[from] serde_json::Error),
@@ -210,6 +220,9 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
     let (taken, to_take) = captures.split_at(begins);
     if let Some(folder) = &options.save {
         SavedScene::check_folder(folder)?;
+    }
+    if let Some(folder) = &options.export {
+        Export::check_folder(folder)?;
     }
     let mut earlier = None;
     if let Some(out) = &options.out {
@@ -259,6 +272,8 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
         held_ticks: run.app.world().resource::<TickHold>().ticks,
     };
     let report = report::report(run.app.world_mut(), options, &maps, timing);
+    // That it fails is no reason to lose the rest.
+    let export = run.export(&maps);
     if let Some(out) = &options.out {
         write_maps(&out.join("maps"), &maps)?;
         if let Some(series) = &series {
@@ -275,6 +290,10 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
             normal: maps.normal,
         });
         SavedScene::capture(run.app.world_mut(), &options.scenario, colors.collect()).write(folder)?;
+    }
+    if let (Some(export), Some(folder)) = (export?, &options.export) {
+        let stem = options.scenario.file.file_stem().unwrap_or_default();
+        export.write(folder, &stem.to_string_lossy())?;
     }
     Ok(report)
 }
@@ -333,6 +352,13 @@ impl ReplayOptions {
             let value = save.display().to_string();
             return wrong("save", value, "a folder of its own, beside those of `out` or in them".into());
         }
+        if let Some(export) = &self.export {
+            let is_same = self.out.as_ref().is_some_and(|out| place(out) == place(export));
+            if is_same || self.save.as_ref().is_some_and(|save| place(export).starts_with(place(save))) {
+                let value = export.display().to_string();
+                return wrong("export", value, "another folder than `out`, and not in `save`".into());
+            }
+        }
         if let Some(count) = self.sheet
             && !(1..=Self::MAX_SHEET).contains(&count)
         {
@@ -360,7 +386,11 @@ impl<'a> Run<'a> {
         if options.render {
             require_adapter()?;
         }
-        let mut scenario = ScenarioPlugin::new(options.scenario.clone(), options.render)?;
+        let mut scenario = if options.export.is_some() && !options.render {
+            ScenarioPlugin::with_materials(options.scenario.clone())?
+        } else {
+            ScenarioPlugin::new(options.scenario.clone(), options.render)?
+        };
         scenario.seed = options.seed;
         let mut app = app::build(options, scenario);
         let target = options.render.then(|| capture::add_target(app.world_mut(), options.size));

@@ -174,6 +174,19 @@ pub struct Timing {
     pub held_ticks: u64,
 }
 
+impl From<ParticleCounts> for ParticleReport {
+    fn from(counts: ParticleCounts) -> Self {
+        Self {
+            emitted: counts.emitted,
+            alive: counts.alive,
+            hit: counts.hit,
+            expired: counts.expired,
+            refused: counts.refused,
+            merged: counts.merged,
+        }
+    }
+}
+
 impl Report {
     /// The expectations that were looked at and did not hold.
     pub fn failed(&self) -> impl Iterator<Item = &ExpectationOutcome> {
@@ -322,7 +335,7 @@ pub(super) fn water_report(world: &World, maps: &[SurfaceAccounts]) -> WaterRepo
 }
 
 /// The water of a world whose surfaces are all among `maps`.
-pub(crate) fn water_of(world: &World, maps: &[SurfaceMaps]) -> WaterReport {
-    let accounts: Vec<_> = maps.iter().map(SurfaceMaps::accounts).collect();
+pub(crate) fn water_of<'m>(world: &World, maps: impl IntoIterator<Item = &'m SurfaceMaps>) -> WaterReport {
+    let accounts: Vec<_> = maps.into_iter().map(SurfaceMaps::accounts).collect();
     water_report(world, &accounts)
 }

@@ -30,13 +30,30 @@ use crate::unwrap::{MapTrianglesError, map_triangles};
 /// Name, triangles, where it stands, and its maps.
 pub type SurfaceMesh = (String, MeshTriangles, Affine3A, Weatherable);
 
+/// How much of the look of a scenario is loaded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Looks {
+    /// Nothing, for runs that draw nothing.
+    None,
+    /// What surfaces look like when they are dry, for runs that draw nothing but are exported.
+    Materials,
+    /// All.
+    All,
+}
+
+impl Looks {
+    pub(super) fn drawn(is_drawn: bool) -> Self {
+        if is_drawn { Self::All } else { Self::None }
+    }
+}
+
 /// Everything but meshes from files, which Bevy's asset server loads.
 pub(super) struct Content {
     /// In the order of the emitters.
     pub(super) effects: Vec<WeatherEffect>,
     /// In the order of the surfaces; `None` for files.
     pub(super) meshes: Vec<Option<Mesh>>,
-    /// In the order of the materials; empty without a renderer.
+    /// In the order of the materials; empty unless they are asked for.
     pub(super) materials: Vec<MaterialMaps>,
     /// Played wet maps, in the order of the surfaces; empty without a renderer.
     pub(super) wet_maps: Vec<Option<Image>>,
@@ -55,8 +72,8 @@ pub(super) struct MaterialMaps {
 }
 
 impl LoadedScenario {
-    /// Loads and generates; without `looks` only what a run without a renderer needs.
-    pub(super) fn content(&self, looks: bool) -> Result<Content, ScenarioError> {
+    /// Loads and generates; of looks only what is asked for.
+    pub(super) fn content(&self, looks: Looks) -> Result<Content, ScenarioError> {
         let scenario = &self.scenario;
         let effects = self.effects()?;
         let mut meshes = Vec::new();
@@ -68,12 +85,22 @@ impl LoadedScenario {
         let mut materials = Vec::new();
         let mut environment = None;
         let mut wet_maps = Vec::new();
-        if looks {
+        if looks == Looks::All {
             for (index, surface) in scenario.surfaces.iter().enumerate() {
                 let field = format!("surfaces[{index}].wet_map.map");
                 let map = surface.wet_map.as_ref().map(|map| self.photo(&field, &map.map, false));
                 wet_maps.push(map.transpose()?);
             }
+            if let Some(spec) = &scenario.environment {
+                let path = self.resolve("environment.map", &spec.map)?;
+                let unusable = |e| self.content_error("environment.map", &spec.map, e);
+                let (width, height, pixels) = load_equirect(&path).map_err(unusable)?;
+                let settings = EnvironmentSettings::default();
+                environment =
+                    Some(environment_maps_from_equirect(width, height, &pixels, settings).map_err(unusable)?);
+            }
+        }
+        if looks != Looks::None {
             // Growing a stone takes a second; each has a thread.
             materials = std::thread::scope(|threads| {
                 let growing: Vec<_> = scenario
@@ -97,14 +124,6 @@ impl LoadedScenario {
                     })
                     .collect::<Result<Vec<_>, _>>()
             })?;
-            if let Some(spec) = &scenario.environment {
-                let path = self.resolve("environment.map", &spec.map)?;
-                let unusable = |e| self.content_error("environment.map", &spec.map, e);
-                let (width, height, pixels) = load_equirect(&path).map_err(unusable)?;
-                let settings = EnvironmentSettings::default();
-                environment =
-                    Some(environment_maps_from_equirect(width, height, &pixels, settings).map_err(unusable)?);
-            }
         }
         Ok(Content { effects, meshes, materials, wet_maps, environment })
     }
@@ -205,7 +224,10 @@ impl LoadedScenario {
         match &material.texture {
             TextureSpec::Plain => {}
             TextureSpec::Photo(photo) => {
-                maps.albedo = Some(self.photo(&format!("{field}.texture"), photo, true)?);
+                let mut albedo = self.photo(&format!("{field}.texture"), photo, true)?;
+                // Whoever exports the scene wants to read it, as those that are generated can be read.
+                albedo.asset_usage = RenderAssetUsages::default();
+                maps.albedo = Some(albedo);
             }
             &TextureSpec::Stone { kind, size, seed } => {
                 let stone = stone_maps(kind, size, seed);
@@ -318,7 +340,7 @@ mod tests {
         )"#;
         let file = folder.path().join("scene.ron");
         std::fs::write(&file, scenario).unwrap();
-        let content = Scenario::load(&file).unwrap().content(true).unwrap();
+        let content = Scenario::load(&file).unwrap().content(Looks::All).unwrap();
         let image = content.wet_maps[0].as_ref().expect("there is a map");
         assert_eq!(image.texture_descriptor.format, TextureFormat::Rgba8Unorm);
         let texels = &image.data.as_ref().expect("it has texels")[..16];

@@ -9,7 +9,7 @@ use bevy::light::{CascadeShadowConfigBuilder, EnvironmentMapLight, Skybox};
 use bevy::prelude::*;
 use bevy::render::RenderApp;
 
-use super::content::Content;
+use super::content::{Content, Looks};
 use super::motion::{ScenarioCamera, move_camera};
 use super::timeline::{MaterialHandles, apply_events_plugin, camera_keys, emitter_motion, insert_events};
 use super::{Digest, LoadedScenario, MeshSpec, ScenarioError};
@@ -29,6 +29,7 @@ use crate::wetting::{self, ExposureProgress, MeasureSurfaces};
 pub struct ScenarioPlugin {
     content: std::sync::Mutex<Option<Content>>,
     scenario: LoadedScenario,
+    looks: Looks,
     /// In place of the scenario's own.
     pub seed: Option<u64>,
 }
@@ -39,8 +40,21 @@ impl ScenarioPlugin {
     /// # Errors
     /// [`ScenarioError::Content`] for files that cannot be used.
     pub fn new(scenario: LoadedScenario, looks: bool) -> Result<Self, ScenarioError> {
+        Self::with_looks(scenario, Looks::drawn(looks))
+    }
+
+    /// For runs without a renderer that are [exported](crate::export::Snapshot): surfaces have their dry materials. Nothing else
+    /// differs, and there is nothing to draw.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_materials(scenario: LoadedScenario) -> Result<Self, ScenarioError> {
+        Self::with_looks(scenario, Looks::Materials)
+    }
+
+    fn with_looks(scenario: LoadedScenario, looks: Looks) -> Result<Self, ScenarioError> {
         let content = std::sync::Mutex::new(Some(scenario.content(looks)?));
-        Ok(Self { content, scenario, seed: None })
+        Ok(Self { content, scenario, looks, seed: None })
     }
 }
 
@@ -95,7 +109,14 @@ impl Plugin for ScenarioPlugin {
 
         let content = self.content.lock().ok().and_then(|mut content| content.take());
         let Some(content) = content else { return };
-        let looks = app.get_sub_app(RenderApp).is_some();
+        let mut looks = Looks::drawn(app.get_sub_app(RenderApp).is_some());
+        if looks == Looks::None && self.looks == Looks::Materials {
+            looks = Looks::Materials;
+            // Only what draws would have brought it.
+            if !app.world().contains_resource::<Assets<StandardMaterial>>() {
+                app.init_asset::<StandardMaterial>();
+            }
+        }
         spawn_scene(app.world_mut(), &self.scenario, content, looks);
     }
 }
@@ -125,7 +146,7 @@ fn asset_path(world: &World, loaded: &LoadedScenario, path: &str) -> String {
     }
 }
 
-pub(super) fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, looks: bool) {
+pub(super) fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, looks: Looks) {
     let scenario = &loaded.scenario;
     for (index, (spec, effect)) in scenario.emitters.iter().zip(content.effects).enumerate() {
         let handle = world.resource_mut::<Assets<WeatherEffect>>().add(effect.clone());
@@ -148,7 +169,7 @@ pub(super) fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: C
         ));
     }
     let mut materials = Vec::new();
-    if looks {
+    if looks != Looks::None {
         for ((name, spec), maps) in scenario.materials.iter().zip(content.materials) {
             let (material, textures) = maps.into_material(spec, &mut world.resource_mut::<Assets<Image>>());
             let handle = world.resource_mut::<Assets<StandardMaterial>>().add(material);
@@ -196,7 +217,7 @@ pub(super) fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: C
     }
     let handles = materials.into_iter().map(|(_, material, textures)| (material, textures));
     world.insert_resource(MaterialHandles(handles.collect()));
-    if looks {
+    if looks == Looks::All {
         spawn_view(world, loaded, content.environment);
     }
 }

@@ -6,7 +6,7 @@
 
 use bevy::prelude::*;
 
-use super::content::Content;
+use super::content::{Content, Looks};
 use super::spawn::{set_up, spawn_scene};
 use super::{LoadedScenario, ScenarioError, SceneEntity, reset_scenario};
 use crate::clock::ShownTime;
@@ -17,7 +17,7 @@ use crate::wetting::DripEffect;
 pub struct PreparedScenario {
     loaded: LoadedScenario,
     content: Content,
-    looks: bool,
+    looks: Looks,
 }
 
 impl PreparedScenario {
@@ -26,6 +26,7 @@ impl PreparedScenario {
     /// # Errors
     /// [`ScenarioError::Content`] for files that cannot be used.
     pub fn new(loaded: LoadedScenario, looks: bool) -> Result<Self, ScenarioError> {
+        let looks = Looks::drawn(looks);
         let content = loaded.content(looks)?;
         Ok(Self { loaded, content, looks })
     }

@@ -10,7 +10,7 @@ use super::rules::{Glb, count};
 use super::scene::scene;
 
 /// Half a minute of heavy rain, as coarse as can be looked at: little runs.
-fn options() -> ExportOptions {
+pub fn options() -> ExportOptions {
     ExportOptions {
         rain_mm_per_h: 20.0,
         minutes: 0.5,
@@ -29,22 +29,22 @@ fn baked(json: impl FnOnce(&mut Value)) -> Export {
 }
 
 /// The only primitive of the mesh that a node shows.
-fn primitive(glb: &Glb, node: usize) -> &Value {
+pub fn primitive(glb: &Glb, node: usize) -> &Value {
     let mesh = count(&glb.list("nodes")[node]["mesh"]);
     &glb.list("meshes")[mesh]["primitives"][0]
 }
 
-fn wet_material(glb: &Glb, node: usize) -> &Value {
+pub fn wet_material(glb: &Glb, node: usize) -> &Value {
     &glb.list("materials")[count(&primitive(glb, node)["material"])]
 }
 
 /// The texels of a texture of a material.
-fn texels(glb: &Glb, info: &Value) -> image::RgbImage {
+pub fn texels(glb: &Glb, info: &Value) -> image::RgbImage {
     let texture = &glb.list("textures")[count(&info["index"])];
     image::load_from_memory(glb.image(count(&texture["source"]))).unwrap().to_rgb8()
 }
 
-fn mean(picture: &image::RgbImage, channel: usize) -> f64 {
+pub fn mean(picture: &image::RgbImage, channel: usize) -> f64 {
     let sum: f64 = picture.pixels().map(|pixel| f64::from(pixel[channel])).sum();
     sum / f64::from(picture.width() * picture.height())
 }
@@ -52,6 +52,7 @@ fn mean(picture: &image::RgbImage, channel: usize) -> f64 {
 #[test]
 fn a_baked_scene_keeps_the_rules_and_all_that_it_had() {
     let export = baked(|_| {});
+    super::keep("scene", &scene().glb(), &export.glb);
     let glb = Glb::parse(&export.glb);
     glb.check();
     let again = gltf::Gltf::from_slice(&export.glb).unwrap();

@@ -49,6 +49,18 @@ impl Glb {
         self.elements(accessor).into_iter().map(|element| element.chunks(4).map(float).collect()).collect()
     }
 
+    /// The numbers of an accessor, element by element, of whatever kind.
+    pub fn any(&self, index: usize) -> Vec<Vec<f32>> {
+        let accessor = &self.list("accessors")[index];
+        if accessor["componentType"] == 5126 {
+            return self.floats(index);
+        }
+        let size = component(accessor);
+        let whole =
+            |bytes: &[u8]| bytes.iter().rev().fold(0, |whole, &byte| whole << 8 | u32::from(byte)) as f32;
+        self.elements(accessor).into_iter().map(|element| element.chunks(size).map(whole).collect()).collect()
+    }
+
     /// The whole numbers of an accessor.
     fn indices(&self, index: usize) -> Vec<u32> {
         let whole = |bytes: &[u8]| bytes.iter().rev().fold(0, |whole, &byte| whole << 8 | u32::from(byte));
@@ -89,6 +101,15 @@ impl Glb {
             for primitive in mesh["primitives"].as_array().unwrap() {
                 self.check_primitive(index, primitive);
             }
+        }
+        for (index, skin) in self.list("skins").iter().enumerate() {
+            self.check_skin(index, skin);
+        }
+        for (index, animation) in self.list("animations").iter().enumerate() {
+            self.check_animation(index, animation);
+        }
+        for (index, node) in self.list("nodes").iter().enumerate() {
+            self.check_posed(index, node);
         }
         let used: BTreeSet<&str> = self.list("extensionsUsed").iter().filter_map(Value::as_str).collect();
         assert_eq!(used.len(), self.list("extensionsUsed").len(), "an extension is named twice");
@@ -137,6 +158,70 @@ impl Glb {
         assert_eq!(elements.len(), count(&accessor["count"]));
     }
 
+    fn check_skin(&self, index: usize, skin: &Value) {
+        let field = format!("skins[{index}]");
+        let joints = skin["joints"].as_array().unwrap();
+        assert!(!joints.is_empty(), "{field}");
+        assert!(joints.iter().all(|joint| count(joint) < self.list("nodes").len()), "{field}");
+        if skin["inverseBindMatrices"].is_u64() {
+            let matrices = &self.list("accessors")[count(&skin["inverseBindMatrices"])];
+            assert_eq!(matrices["type"], "MAT4", "{field}");
+            assert_eq!(matrices["componentType"], 5126, "{field}");
+            assert!(count(&matrices["count"]) >= joints.len(), "{field}");
+        }
+    }
+
+    fn check_animation(&self, index: usize, animation: &Value) {
+        let field = format!("animations[{index}]");
+        let samplers = animation["samplers"].as_array().unwrap();
+        for channel in animation["channels"].as_array().unwrap() {
+            let sampler = &samplers[count(&channel["sampler"])];
+            assert!(count(&channel["target"]["node"]) < self.list("nodes").len(), "{field}");
+            let times = self.floats(count(&sampler["input"]));
+            assert!(times.is_sorted_by(|a, b| a[0] < b[0]) && times[0][0] >= 0.0, "{field}");
+            let told = &self.list("accessors")[count(&sampler["input"])];
+            assert!(told["min"].is_array() && told["max"].is_array(), "{field}");
+            let values = count(&self.list("accessors")[count(&sampler["output"])]["count"]);
+            assert!(values >= times.len() && values.is_multiple_of(times.len()), "{field}");
+        }
+    }
+
+    /// What a node says about joints and morph targets fits the mesh that it shows.
+    fn check_posed(&self, index: usize, node: &Value) {
+        let field = format!("nodes[{index}]");
+        if node["mesh"].is_null() {
+            assert!(node["skin"].is_null() && node["weights"].is_null(), "{field}");
+            return;
+        }
+        let mesh = &self.list("meshes")[count(&node["mesh"])];
+        let primitives = mesh["primitives"].as_array().unwrap();
+        let targets: Vec<usize> =
+            primitives.iter().map(|primitive| primitive["targets"].as_array().map_or(0, Vec::len)).collect();
+        assert!(targets.iter().all(|&number| number == targets[0]), "{field}: {targets:?}");
+        for weights in [&node["weights"], &mesh["weights"]] {
+            assert!(
+                weights.as_array().is_none_or(|weights| weights.len() == targets[0]),
+                "{field}: {weights}"
+            );
+        }
+        let Some(skin) = node["skin"].as_u64() else { return };
+        let joints = self.list("skins")[skin as usize]["joints"].as_array().unwrap().len();
+        for primitive in primitives {
+            let attributes = &primitive["attributes"];
+            let weights = self.floats(count(&attributes["WEIGHTS_0"]));
+            for weights in weights {
+                assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-4, "{field}: {weights:?}");
+            }
+            let accessor = &self.list("accessors")[count(&attributes["JOINTS_0"])];
+            assert_eq!(accessor["type"], "VEC4", "{field}");
+            let size = component(accessor);
+            for joint in self.elements(accessor).into_iter().flat_map(|element| element.chunks(size)) {
+                let number = joint.iter().rev().fold(0, |whole, &byte| whole << 8 | usize::from(byte));
+                assert!(number < joints, "{field}: joint {number}");
+            }
+        }
+    }
+
     fn check_primitive(&self, mesh: usize, primitive: &Value) {
         let field = format!("meshes[{mesh}]");
         let attributes = primitive["attributes"].as_object().unwrap();
@@ -150,6 +235,19 @@ impl Glb {
                 view["byteStride"].as_u64().map_or(component(values) * parts(values), |s| s as usize);
             assert!(stride.is_multiple_of(4), "{field}.{name}: vertices begin at whole words");
             assert!(view["target"].is_null() || view["target"] == 34_962, "{field}.{name}");
+        }
+        for target in primitive["targets"].as_array().into_iter().flatten() {
+            for (name, index) in target.as_object().unwrap() {
+                assert!(
+                    attributes.contains_key(name),
+                    "{field}: a target moves `{name}`, which is not there"
+                );
+                let values = accessor(index);
+                assert_eq!(count(&values["count"]), vertices, "{field}.{name}");
+                assert_eq!(values["type"], "VEC3", "{field}.{name}");
+                let bounded = values["min"].is_array() && values["max"].is_array();
+                assert!(bounded || name != "POSITION", "{field}: a target without bounds");
+            }
         }
         let position = accessor(&attributes["POSITION"]);
         assert!(position["min"].is_array() && position["max"].is_array(), "{field}.POSITION has no bounds");

@@ -13,6 +13,19 @@ pub struct Builder {
 }
 
 impl Builder {
+    /// A glTF with an empty scene.
+    pub fn new() -> Self {
+        let json = json!({
+            "asset": { "version": "2.0", "generator": "a test" },
+            "extras": { "author": "somebody" },
+            "scene": 0,
+            "scenes": [{ "nodes": [0] }],
+            "accessors": [], "bufferViews": [], "images": [], "textures": [], "materials": [], "meshes": [],
+            "cameras": [{ "type": "perspective", "perspective": { "yfov": 1.0, "znear": 0.1 } }],
+        });
+        Self { json, bytes: Vec::new() }
+    }
+
     fn view(&mut self, bytes: &[u8]) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let view = json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len() });
@@ -20,13 +33,13 @@ impl Builder {
         self.push("bufferViews", view)
     }
 
-    fn push(&mut self, list: &str, entry: Value) -> usize {
+    pub fn push(&mut self, list: &str, entry: Value) -> usize {
         let list = self.json[list].as_array_mut().unwrap();
         list.push(entry);
         list.len() - 1
     }
 
-    fn vectors<const N: usize>(&mut self, values: &[[f32; N]]) -> usize {
+    pub fn vectors<const N: usize>(&mut self, values: &[[f32; N]]) -> usize {
         let bytes: Vec<u8> = values.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect();
         let view = self.view(&bytes);
         let bound = |pick: fn(f32, f32) -> f32| -> Vec<f32> {
@@ -41,7 +54,30 @@ impl Builder {
         )
     }
 
-    fn corners(&mut self, corners: &[u16]) -> usize {
+    /// Numbers by themselves.
+    pub fn scalars(&mut self, values: &[f32]) -> usize {
+        let all: Vec<[f32; 1]> = values.iter().map(|&value| [value]).collect();
+        let accessor = self.vectors(&all);
+        self.json["accessors"][accessor]["type"] = "SCALAR".into();
+        accessor
+    }
+
+    /// Matrices, column by column.
+    pub fn matrices(&mut self, values: &[[f32; 16]]) -> usize {
+        let accessor = self.vectors(values);
+        self.json["accessors"][accessor]["type"] = "MAT4".into();
+        accessor
+    }
+
+    /// Joints of vertices.
+    pub fn joints(&mut self, joints: &[[u8; 4]]) -> usize {
+        let view = self.view(joints.as_flattened());
+        let accessor =
+            json!({ "bufferView": view, "componentType": 5121, "count": joints.len(), "type": "VEC4" });
+        self.push("accessors", accessor)
+    }
+
+    pub fn corners(&mut self, corners: &[u16]) -> usize {
         let bytes: Vec<u8> = corners.iter().flat_map(|corner| corner.to_le_bytes()).collect();
         let view = self.view(&bytes);
         let accessor =
@@ -83,17 +119,7 @@ impl Builder {
 
 /// Nodes: 0 carries the others, 1 ground, 2 roof, 3 wall, 4 strip. Meshes: 0 ground and roof, 1 wall, 2 strip.
 pub fn scene() -> Builder {
-    let mut scene = Builder {
-        json: json!({
-            "asset": { "version": "2.0", "generator": "a test" },
-            "extras": { "author": "somebody" },
-            "scene": 0,
-            "scenes": [{ "nodes": [0] }],
-            "accessors": [], "bufferViews": [], "images": [], "textures": [], "materials": [], "meshes": [],
-            "cameras": [{ "type": "perspective", "perspective": { "yfov": 1.0, "znear": 0.1 } }],
-        }),
-        bytes: Vec::new(),
-    };
+    let mut scene = Builder::new();
     let brick = scene.texture(&RgbImage::from_fn(8, 8, |x, y| {
         if (x + y) % 2 == 0 { Rgb([190, 110, 90]) } else { Rgb([150, 80, 60]) }
     }));

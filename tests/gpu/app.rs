@@ -1,5 +1,6 @@
 //! Small Bevy apps that render without a window.
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use bevy::camera::RenderTarget;
@@ -35,7 +36,7 @@ pub fn unfinished_app() -> Option<App> {
 
 /// The same with pipelines that are compiled in the background, as games have it.
 pub fn app_that_compiles_in_the_background() -> Option<App> {
-    let mut app = bare(false)?;
+    let mut app = bare(false, AssetPlugin::default())?;
     app.add_plugins(WeatheringPlugins).insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
     app.finish();
     app.cleanup();
@@ -44,13 +45,20 @@ pub fn app_that_compiles_in_the_background() -> Option<App> {
 
 /// Bevy alone.
 pub fn bare_app() -> Option<App> {
-    bare(true)
+    bare(true, AssetPlugin::default())
 }
 
-fn bare(synchronous_pipeline_compilation: bool) -> Option<App> {
+/// Bevy alone, with its files in a folder.
+pub fn bare_app_with_files(folder: &Path) -> Option<App> {
+    bare(true, AssetPlugin { file_path: folder.to_string_lossy().into_owned(), ..default() })
+}
+
+fn bare(synchronous_pipeline_compilation: bool, files: AssetPlugin) -> Option<App> {
     harness::gpu()?;
     let mut app = App::new();
-    app.add_plugins(offscreen::plugins().set(RenderPlugin { synchronous_pipeline_compilation, ..default() }));
+    app.add_plugins(
+        offscreen::plugins().set(files).set(RenderPlugin { synchronous_pipeline_compilation, ..default() }),
+    );
     Some(app)
 }
 

@@ -89,6 +89,9 @@ pub struct ReplayArgs {
     #[arg(long, value_name = "PICTURES", num_args = 0..=1, require_equals = true, default_missing_value = "12")]
     #[arg(requires = "out", conflicts_with = "no_render")]
     pub sheet: Option<u32>,
+    /// Folder for the scene as it is at the end, for other engines: NAME_weathered.glb, maps/, report.json; not that of --out
+    #[arg(long, value_name = "DIR")]
+    pub export: Option<PathBuf>,
     /// End when standard input does, as it does when whoever holds the other end of it is gone
     #[arg(long, hide = true)]
     pub end_with_input: bool,

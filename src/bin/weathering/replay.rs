@@ -39,6 +39,7 @@ fn run_one(file: &Path, arguments: &ReplayArgs) -> Result<ExitCode, Box<dyn Erro
         every: arguments.every,
         video: arguments.video,
         sheet: arguments.sheet,
+        export: arguments.export.clone(),
         ..ReplayOptions::new(Scenario::load_variant(file, arguments.variant.as_deref())?)
     };
     let bar = ProgressBar::no_length().with_style(

@@ -49,9 +49,11 @@ pub fn run(arguments: &ReplayArgs) -> Result<(), Box<dyn Error>> {
     let Some(out) = &arguments.out else {
         return Err("many scenarios, --jobs and --only need --out, the folder for their folders".into());
     };
-    for (option, is_given) in
-        [("--resume", arguments.resume.is_some()), ("--save-state", arguments.save_state.is_some())]
-    {
+    for (option, is_given) in [
+        ("--resume", arguments.resume.is_some()),
+        ("--save-state", arguments.save_state.is_some()),
+        ("--export", arguments.export.is_some()),
+    ] {
         if is_given {
             return Err(format!("{option} is for a single scenario, without --jobs and --only").into());
         }
@@ -117,6 +119,7 @@ fn handed_on(arguments: &ReplayArgs) -> Vec<String> {
         threads: _,
         resume: _,
         save_state: _,
+        export: _,
         end_with_input: _,
         variant,
         fps,

@@ -27,6 +27,7 @@ const KEYS: &[(&str, &str)] = &[
     ("U", "hide panels, show them"),
     ("M, P", "maps, plots"),
     ("V", "what surfaces show: look, wetness, film, saturation, source"),
+    ("X", "export the scene as it is"),
     ("F12", "picture without panels"),
     ("F11", "begin, end a sequence of pictures"),
     ("? or F1", "this list"),

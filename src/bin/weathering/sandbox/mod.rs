@@ -7,6 +7,7 @@ mod brush;
 mod camera;
 mod effects;
 mod emitters;
+mod export;
 mod heat;
 mod hose;
 mod keys;
@@ -103,6 +104,7 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
             saving::plugin,
             leave::plugin,
             reveal::plugin,
+            export::plugin,
         ))
         .add_systems(PreUpdate, spare_software_renderers)
         .add_systems(Update, tell_of_reloads)

@@ -17,6 +17,7 @@ use bevy_weathering::replay::without_padding;
 use bevy_weathering::save::{ColorMaps, SaveError, SavedScene};
 use bevy_weathering::scenario::{LoadedScenario, ScenarioStatus, ScenarioSurface, reset_scenario};
 
+use super::export;
 use super::hose::InHand;
 use super::leave::Leaving;
 use super::open::Opened;
@@ -98,6 +99,11 @@ fn save(world: &mut World) {
     }
 }
 
+/// Whether a scene is being saved, or gone on with.
+pub fn is_busy(world: &World) -> bool {
+    world.resource::<Saving>().0.is_some()
+}
+
 /// Why the scene cannot be saved as it is.
 fn obstacle(world: &mut World) -> Option<&'static str> {
     let opened = world.resource::<Opened>();
@@ -127,7 +133,7 @@ pub fn show(ui: &mut egui::Ui, world: &mut World) {
     });
     let path = PathBuf::from(folder.trim());
     world.resource_mut::<Folder>().0 = Some(folder);
-    if world.resource::<Saving>().0.is_some() {
+    if is_busy(world) || export::is_reading(world) {
         ui.horizontal(|ui| {
             ui.spinner();
             ui.label("at work");

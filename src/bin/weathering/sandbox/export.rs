@@ -1,0 +1,153 @@
+//! Exporting the scene as it is now, for other engines, with `src/export`: by a button, or by X.
+//!
+//! Time stands still until what has been painted is read back. Then it goes on, while the scene is baked and written on another
+//! thread.
+
+use std::path::PathBuf;
+
+use bevy::prelude::*;
+use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+use bevy_egui::egui;
+use bevy_weathering::export::{ColorReadback, ExportError, Snapshot};
+use bevy_weathering::scenario::ScenarioStatus;
+
+use super::open::Opened;
+use super::saving;
+use super::shots::{OutFolder, free_name};
+use super::split::Split;
+use super::ui::{Note, keyboard_is_free};
+
+/// Frames that time stands still before anything is read.
+const SETTLE: u32 = 4;
+
+/// A scene that is being exported.
+#[derive(Resource, Default)]
+struct Exporting(Option<Step>);
+
+enum Step {
+    /// So many frames until the maps are read. `goes_on`: time ran before.
+    Settling { frames: u32, goes_on: bool },
+    /// On their way from the GPU.
+    Reading { colors: ColorReadback, goes_on: bool },
+    /// On another thread; the file that it becomes.
+    Writing(Task<Result<PathBuf, ExportError>>),
+}
+
+pub fn plugin(app: &mut App) {
+    app.init_resource::<Exporting>().add_systems(Update, (key.run_if(keyboard_is_free), advance).chain());
+}
+
+/// Whether the scene has to stay as it is.
+pub fn is_reading(world: &World) -> bool {
+    matches!(world.resource::<Exporting>().0, Some(Step::Settling { .. } | Step::Reading { .. }))
+}
+
+/// The button.
+pub fn show(ui: &mut egui::Ui, world: &mut World) {
+    ui.heading("For other engines");
+    if world.resource::<Exporting>().0.is_some() {
+        ui.horizontal(|ui| {
+            ui.spinner();
+            ui.label("at work");
+        });
+        return;
+    }
+    match obstacle(world) {
+        Some(why) => {
+            ui.label(why);
+        }
+        None => {
+            let about = "The surfaces as they are now, dry and wet, as a .glb with its maps and a report (X)";
+            if ui.button("Export").on_hover_text(about).clicked() {
+                begin(world);
+            }
+        }
+    }
+    ui.small(format!("into {}", world.resource::<OutFolder>().0.display()));
+}
+
+/// Why the scene cannot be exported now.
+fn obstacle(world: &World) -> Option<&'static str> {
+    if !matches!(*world.resource::<ScenarioStatus>(), ScenarioStatus::Ready) {
+        return Some("The scene is not there yet.");
+    }
+    if world.contains_resource::<Split>() {
+        return Some("End the comparison first: the copy is no part of the scene.");
+    }
+    saving::is_busy(world).then_some("Wait until the scene is saved.")
+}
+
+fn key(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
+    if keys.just_pressed(KeyCode::KeyX) {
+        commands.queue(begin);
+    }
+}
+
+fn begin(world: &mut World) {
+    if world.resource::<Exporting>().0.is_some() {
+        return;
+    }
+    if let Some(why) = obstacle(world) {
+        world.resource_mut::<Note>().complain(why);
+        return;
+    }
+    let mut time = world.resource_mut::<Time<Virtual>>();
+    let goes_on = !time.is_paused();
+    time.pause();
+    world.resource_mut::<Exporting>().0 = Some(Step::Settling { frames: SETTLE, goes_on });
+}
+
+fn advance(world: &mut World) {
+    let Some(step) = world.resource_mut::<Exporting>().0.take() else { return };
+    let next = match step {
+        // Another scene has taken its place, which is paused for reasons of its own.
+        Step::Settling { .. } | Step::Reading { .. }
+            if !matches!(*world.resource::<ScenarioStatus>(), ScenarioStatus::Ready) =>
+        {
+            None
+        }
+        Step::Settling { frames: 0, goes_on } => {
+            Some(Step::Reading { colors: ColorReadback::begin(world), goes_on })
+        }
+        Step::Settling { frames, goes_on } => {
+            let frames = if ColorReadback::is_painted(world) { frames - 1 } else { SETTLE };
+            Some(Step::Settling { frames, goes_on })
+        }
+        Step::Reading { colors, goes_on } if colors.is_done() => write(world, &colors, goes_on),
+        Step::Reading { colors, goes_on } => Some(Step::Reading { colors, goes_on }),
+        Step::Writing(mut task) => match check_ready(&mut task) {
+            None => Some(Step::Writing(task)),
+            Some(written) => {
+                let mut note = world.resource_mut::<Note>();
+                match written {
+                    Ok(scene) => note.tell(format!("exported {}", scene.display())),
+                    Err(error) => note.complain(error.to_string()),
+                }
+                None
+            }
+        },
+    };
+    world.resource_mut::<Exporting>().0 = next;
+}
+
+/// Takes the state, lets time go on, and has the scene made.
+fn write(world: &mut World, colors: &ColorReadback, goes_on: bool) -> Option<Step> {
+    let file = world.resource::<Opened>().loaded.file.clone();
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let taken = Snapshot::take(world, &name, &colors.finish());
+    if goes_on {
+        world.resource_mut::<Time<Virtual>>().unpause();
+    }
+    let snapshot = match taken {
+        Ok(snapshot) => snapshot,
+        Err(error) => {
+            world.resource_mut::<Note>().complain(error.to_string());
+            return None;
+        }
+    };
+    let folder = free_name(&world.resource::<OutFolder>().0, "export", "");
+    let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let task = AsyncComputeTaskPool::get()
+        .spawn(async move { snapshot.bake(None)?.write(&folder, &stem).map(|[scene, _]| scene) });
+    Some(Step::Writing(task))
+}
