@@ -6,8 +6,6 @@ use bevy::gltf::GltfPlugin;
 use bevy::image::{CompressedImageFormatSupport, CompressedImageFormats, ImagePlugin};
 use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
-use bevy::render::render_resource::PollType;
-use bevy::render::renderer::RenderDevice;
 use bevy::tasks::block_on;
 use bevy::world_serialization::WorldSerializationPlugin;
 

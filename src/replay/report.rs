@@ -174,19 +174,6 @@ pub struct Timing {
     pub held_ticks: u64,
 }
 
-impl From<ParticleCounts> for ParticleReport {
-    fn from(counts: ParticleCounts) -> Self {
-        Self {
-            emitted: counts.emitted,
-            alive: counts.alive,
-            hit: counts.hit,
-            expired: counts.expired,
-            refused: counts.refused,
-            merged: counts.merged,
-        }
-    }
-}
-
 impl Report {
     /// The expectations that were looked at and did not hold.
     pub fn failed(&self) -> impl Iterator<Item = &ExpectationOutcome> {

@@ -82,8 +82,8 @@ fn keys_pause_start_over_take_pictures_and_leave() {
     ]);
     assert!(sandbox.picture().as_raw() == turned.as_raw(), "the camera turned over a panel");
     // Exported as it is; the report comes last.
-    xdotool(&["key", "x"]);
-    let exported = out.join("export_000");
+    sandbox.key("x");
+    let exported = scenery.out().join("export_000");
     wait_for("the export", || exported.join("report.json").exists().then_some(()));
     assert!(exported.join("floor_weathered.glb").is_file() && exported.join("maps/floor_film.png").is_file());
     sandbox.key("Escape");
