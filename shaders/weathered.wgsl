@@ -11,7 +11,10 @@
     pbr_bindings,
     pbr_fragment::pbr_input_from_standard_material,
     pbr_functions::{alpha_discard, apply_pbr_lighting, main_pass_post_lighting_processing},
-    pbr_types::{PbrInput, STANDARD_MATERIAL_FLAGS_UNLIT_BIT},
+    pbr_types::{
+        PbrInput, STANDARD_MATERIAL_FLAGS_ALPHA_MODE_OPAQUE, STANDARD_MATERIAL_FLAGS_ALPHA_MODE_RESERVED_BITS,
+        STANDARD_MATERIAL_FLAGS_UNLIT_BIT,
+    },
 }
 #import bevy_weathering::{
     wet_lighting::apply_wet_lighting,
@@ -26,6 +29,10 @@
 
 #ifdef VISIBILITY_RANGE_DITHER
 #import bevy_pbr::pbr_functions::visibility_range_dither
+#endif
+
+#ifdef OIT_ENABLED
+#import bevy_core_pipeline::oit::oit_draw
 #endif
 
 #ifdef WEATHERED_UVS
@@ -58,6 +65,8 @@ fn apply_paint(pbr: ptr<function, PbrInput>, in: VertexOutput, frame: Frame) {
     let diffuse = textureSample(diffuse_map, map_sampler, uv);
     let base = (*pbr).material.base_color;
     (*pbr).material.base_color = vec4(base.rgb * (1.0 - diffuse.a) + diffuse.rgb, base.a);
+    // What covers metal is none.
+    (*pbr).material.metallic *= 1.0 - diffuse.a;
     let specular = textureSample(specular_map, map_sampler, uv);
     (*pbr).material.reflectance = (*pbr).material.reflectance * (1.0 - specular.a) + specular.r;
     (*pbr).material.perceptual_roughness =
@@ -188,5 +197,13 @@ fn fragment(in: VertexOutput, @builtin(front_facing) is_front: bool) -> Fragment
 #endif
     }
     out.color = main_pass_post_lighting_processing(pbr, out.color);
+#ifdef OIT_ENABLED
+    // What is not opaque is only noted down here, and drawn when all of it is known.
+    let alpha_mode = pbr.material.flags & STANDARD_MATERIAL_FLAGS_ALPHA_MODE_RESERVED_BITS;
+    if alpha_mode != STANDARD_MATERIAL_FLAGS_ALPHA_MODE_OPAQUE {
+        oit_draw(in.position, out.color);
+        discard;
+    }
+#endif
     return out;
 }
