@@ -156,8 +156,10 @@ fn weathered_color(pbr_input: PbrInput, in: VertexOutput, frame: Frame) -> vec4<
 #ifdef WEATHERED_STANDING
     let waves = ripples(uv, in.world_position.xyz, water.levelness);
     normal = relieved(frame, normal, -waves.xy);
-    // Rain that is not simulated knows no uvs: its waves are those of level water, laid on this one.
-    normal = reoriented(normal.xzy, relief_normal(-waves.zw)).xzy;
+    // Rain that is not simulated knows no uvs: its waves are those of level water, laid on this one. On a slope of 41 degrees
+    // water runs, and there are none.
+    let level = saturate(4.0 * frame.normal.y - 3.0);
+    normal = reoriented(normal.xzy, relief_normal(-level * waves.zw)).xzy;
 #endif
 #endif
     pbr.material.diffuse_transmission =
