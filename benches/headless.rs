@@ -1,37 +1,23 @@
 //! An app with everything that renders without a window and without a tick, and what its GPU holds.
 
-use bevy::app::PanicHandlerPlugin;
-use bevy::log::LogPlugin;
 use bevy::prelude::*;
-use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
+use bevy::render::RenderApp;
 use bevy::render::render_asset::RenderAssets;
 use bevy::render::renderer::{RenderAdapterInfo, RenderDevice, RenderQueue};
 use bevy::render::texture::GpuImage;
-use bevy::render::{RenderApp, RenderPlugin};
 use bevy::time::TimeUpdateStrategy;
-use bevy::window::ExitCondition;
-use bevy::winit::WinitPlugin;
 use bevy_weathering::WeatheringPlugins;
+use bevy_weathering::offscreen;
 use bevy_weathering::overlay::SplatBudget;
 
 /// Frames hold no tick: what is there stays as it is, and what is timed is drawing alone.
 pub fn app() -> App {
     let mut app = App::new();
-    let no_window =
-        WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
-    app.add_plugins(
-        DefaultPlugins
-            .set(no_window)
-            .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
-            .disable::<WinitPlugin>()
-            .disable::<PipelinedRenderingPlugin>()
-            .disable::<LogPlugin>()
-            .disable::<PanicHandlerPlugin>(),
-    )
-    .add_plugins(WeatheringPlugins)
-    // What is pushed at once is timed in one frame.
-    .insert_resource(SplatBudget::LARGEST)
-    .insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
+    app.add_plugins(offscreen::plugins())
+        .add_plugins(WeatheringPlugins)
+        // What is pushed at once is timed in one frame.
+        .insert_resource(SplatBudget::LARGEST)
+        .insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
     app.finish();
     app.cleanup();
     app

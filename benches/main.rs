@@ -13,7 +13,7 @@
 //! | [`wetting`] | water that runs, and surfaces at rest | a tick without surfaces |
 //! | [`splat`] | painting on the CPU, and sorting for the GPU | each other |
 //! | [`overlap`] | 100,000 stamps in a frame on the GPU | [`quads`]: instanced, and a draw for each |
-//! | [`drawing`] | a frame with up to 500,000 particles in sight | the same frame without |
+//! | [`drawing`] | a frame with up to 200,000 particles in sight | the same frame without, and as many plain instances |
 //!
 //! `cargo bench --bench main` runs all of them, `cargo bench --bench main -- cast` one. Results, predictions
 //! and limits are in `benches/NOTES.md`.

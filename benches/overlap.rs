@@ -10,7 +10,8 @@
 //!
 //! All stamps are domes of one radius, even over a map of 1024 by 1024 with clamped edges; the radius is chosen so that
 //! their discs lie as deep as wanted in the mean. Every call paints over what the calls before it left, and ends when the
-//! GPU is done. Before anything is timed, both paint the same stamps on fresh maps, and these must be alike.
+//! GPU is done. Before anything is timed, both paint the same stamps on fresh maps, and these must be alike. On a slow
+//! driver, they take fewer turns.
 
 use std::cell::RefCell;
 use std::f32::consts::PI;
@@ -29,7 +30,9 @@ use crate::scene::Random;
 
 const SPLATS: usize = 100_000;
 const DEPTHS: [u32; 3] = [1, 8, 32];
+/// At most, and as many as the stamps of one depth are worth: at least one.
 const ROUNDS: u32 = 3;
+const WORTH: Duration = Duration::from_secs(15);
 const SURFACE: Weatherable = Weatherable {
     map_size: 1024,
     wrap_u: Wrap::Clamp,
@@ -118,8 +121,8 @@ impl Ours {
         (self.painted() - before) as usize
     }
 
-    /// Paints in as many frames as the first time takes.
-    fn paint_first(&mut self, splats: &[Splat]) {
+    /// Paints in as many frames as the first time takes. Returns for how long.
+    fn paint_first(&mut self, splats: &[Splat]) -> Duration {
         let all = self.painted() + splats.len() as u64;
         self.push(splats);
         let begun = Instant::now();
@@ -127,6 +130,7 @@ impl Ours {
             assert!(begun.elapsed() < PATIENCE, "splats are not painted");
             headless::frame(&mut self.app);
         }
+        begun.elapsed()
     }
 
     /// Bytes of the diffuse, the specular and the normal map.
@@ -149,10 +153,10 @@ fn mean_coverage(map: &[u8]) -> f64 {
     sum as f64 * 4.0 / map.len() as f64
 }
 
-/// Painters that do not paint the same must not be timed.
-fn check(group: &str, ours: &mut Ours, quads: &mut Quads, splats: &[Splat]) {
+/// Painters that do not paint the same must not be timed. Returns how many rounds are worth their time.
+fn check(group: &str, ours: &mut Ours, quads: &mut Quads, splats: &[Splat]) -> u32 {
     ours.renew();
-    ours.paint_first(splats);
+    let once = ours.paint_first(splats);
     quads.renew();
     quads.instanced(splats);
     let (left, right) = (ours.read(), quads.read());
@@ -173,6 +177,7 @@ fn check(group: &str, ours: &mut Ours, quads: &mut Quads, splats: &[Splat]) {
     quads.renew();
     quads.one_by_one(few);
     assert!(at_once == quads.read(), "{group}: a draw for each stamp paints something else");
+    ((WORTH.as_secs_f64() / once.as_secs_f64()) as u32).clamp(1, ROUNDS)
 }
 
 /// How many stamps can be drawn one by one in a time that one likes to wait.
@@ -186,14 +191,15 @@ fn affordable_draws(quads: &mut Quads, splats: &[Splat]) -> usize {
 fn compare(depth: u32, ours: &mut Ours, quads: &mut Quads) {
     let group = format!("overlap, {depth} deep");
     let splats = splats(depth);
-    check(&group, ours, quads, &splats);
+    let rounds = check(&group, ours, quads, &splats);
     let draws = affordable_draws(quads, &splats);
 
     let (mut bins, mut headers, mut list) = (TileBins::default(), Vec::new(), Vec::new());
     let mut bin = || {
         headers.clear();
         list.clear();
-        bins.bin(&splats, SURFACE.map_size, SURFACE.wrap(), None, 0, &mut headers, &mut list);
+        let (size, wrap) = (SURFACE.map_size, SURFACE.wrap());
+        bins.bin_within(usize::MAX, &splats, size, wrap, None, 0, &mut headers, &mut list);
         list.len()
     };
     let tiles = bin() as f64 / SPLATS as f64;
@@ -207,7 +213,7 @@ fn compare(depth: u32, ours: &mut Ours, quads: &mut Quads) {
     ];
     let counted = "splats (in tiles, if binned)";
     let [compute, instanced, one_by_one, empty, binning] =
-        measure::means(&group, counted, &mut contenders, ROUNDS, 1);
+        measure::means(&group, counted, &mut contenders, rounds, 1);
     let one_by_one = one_by_one * SPLATS as f64 / draws as f64;
     if draws < SPLATS {
         println!("{group}: one by one {draws} were drawn, and the time scaled to {SPLATS}");

@@ -6,14 +6,11 @@
 
 use std::time::Instant;
 
-use bevy::asset::RenderAssetUsages;
-use bevy::camera::RenderTarget;
 use bevy::camera::visibility::RenderLayers;
-use bevy::light::EnvironmentMapLight;
 use bevy::prelude::*;
-use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat, TextureUsages};
 use bevy::time::TimeUpdateStrategy;
 use bevy_weathering::material::{DryMaterial, PorousMaterial, WettingModel};
+use bevy_weathering::offscreen::Stage;
 use bevy_weathering::overlay::Weatherable;
 use bevy_weathering::scenes::stone::{Stone, stone_maps};
 use bevy_weathering::schedule::WeatheringTick;
@@ -97,24 +94,9 @@ pub fn bench(_: &mut Criterion) {
     let mut app = headless::app();
     app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
     let world = app.world_mut();
-    let mut target = Image::new_uninit(
-        Extent3d { width: SIZE.x, height: SIZE.y, depth_or_array_layers: 1 },
-        TextureDimension::D2,
-        TextureFormat::Rgba8UnormSrgb,
-        RenderAssetUsages::RENDER_WORLD,
-    );
-    target.texture_descriptor.usage |= TextureUsages::RENDER_ATTACHMENT;
+    let sun = DirectionalLight { illuminance: 5000.0, ..default() };
+    let stage = Stage::new(world, SIZE, sun, Vec3::NEG_ONE);
     let mut images = world.resource_mut::<Assets<Image>>();
-    let target = images.add(target);
-    let environment = EnvironmentMapLight {
-        intensity: 400.0,
-        ..EnvironmentMapLight::hemispherical_gradient(
-            &mut images,
-            Color::linear_rgb(0.5, 0.7, 1.0),
-            Color::linear_rgb(0.8, 0.8, 0.8),
-            Color::linear_rgb(0.25, 0.2, 0.15),
-        )
-    };
     let stone = stone_maps(Stone::Brick, 512, 1);
     let roughness = images.add(stone.roughness);
     let dry = StandardMaterial {
@@ -128,20 +110,9 @@ pub fn bench(_: &mut Criterion) {
     let wall_mesh = Mesh::from(Rectangle::from_size(size)).with_generated_tangents().unwrap();
     let mesh = world.resource_mut::<Assets<Mesh>>().add(wall_mesh);
     let all = RenderLayers::from_layers(&(0..walls.len() + 1).collect::<Vec<_>>());
-    world.spawn((
-        DirectionalLight { illuminance: 5000.0, ..default() },
-        Transform::default().looking_to(Vec3::new(-1.0, -1.0, -1.0), Vec3::Y),
-        all,
-    ));
-    let camera = world
-        .spawn((
-            Camera3d::default(),
-            Msaa::Off,
-            RenderTarget::from(target),
-            environment,
-            Transform::from_xyz(0.6, 0.3, 2.0).looking_at(Vec3::new(0.2, 0.0, 0.0), Vec3::Y),
-        ))
-        .id();
+    world.entity_mut(stage.sun).insert(all);
+    let eye = Transform::from_xyz(0.6, 0.3, 2.0).looking_at(Vec3::new(0.2, 0.0, 0.0), Vec3::Y);
+    let camera = world.spawn(stage.camera(eye)).id();
     let mut entities = Vec::new();
     for (layer, wall) in walls.iter().enumerate() {
         entities.push(spawn_wall(&mut app, wall, layer, &mesh, &dry));

@@ -1,7 +1,7 @@
 //! Splats on the CPU: painting them, and sorting them into tiles for the GPU.
 //!
 //! 10,000 stamps of 5 texels radius, evenly spread over a map of 1024 by 1024 that repeats.
-//! [`CpuMaps::paint`] is all the work of a run without a renderer; [`TileBins::bin`] is what a frame with one
+//! [`CpuMaps::paint`] is all the work of a run without a renderer; [`TileBins::bin_within`] is what a frame with one
 //! costs the CPU, apart from the upload. The ratio tells how much of the work the GPU takes over.
 
 use bevy_weathering::overlay::{CpuMaps, Splat, StampAtlas, TileBins, Weatherable, Wrap};
@@ -55,7 +55,7 @@ pub fn bench(criterion: &mut Criterion) {
     let bin = || {
         headers.clear();
         list.clear();
-        bins.bin(&splats, MAP_SIZE, wrap, None, 0, &mut headers, &mut list);
+        bins.bin_within(usize::MAX, &splats, MAP_SIZE, wrap, None, 0, &mut headers, &mut list);
         list.len()
     };
     let mut contenders = [Contender::new("cpu_paint", paint), Contender::new("tile_bins", bin)];

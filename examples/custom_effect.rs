@@ -43,9 +43,9 @@ fn setup(
     mut effects: ResMut<Assets<WeatherEffect>>,
 ) -> Result {
     let effect = thrown_paint();
-    // A file is checked when it is loaded, and brings its stamps; what is made in code has to ask for both.
+    // A file is checked when it is loaded; what is made in code has to ask for it.
     effect.validate()?;
-    let effect = effects.add(effect.with_stamps()?);
+    let effect = effects.add(effect);
 
     commands.spawn((
         Weatherable { map_size: 1024, ..default() },

@@ -4,7 +4,6 @@ use bevy::asset::AssetPlugin;
 use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
-use bevy_weathering::effect::DropSizes;
 use bevy_weathering::prelude::*;
 
 /// Weather time.
@@ -23,34 +22,27 @@ fn main() -> AppExit {
         .run()
 }
 
-fn setup(
-    mut commands: Commands,
-    mut meshes: ResMut<Assets<Mesh>>,
-    mut effects: ResMut<Assets<WeatherEffect>>,
-) {
+fn setup(mut commands: Commands, assets: Res<AssetServer>, mut meshes: ResMut<Assets<Mesh>>) {
     let floor = meshes.add(Plane3d::new(Vec3::Y, Vec2::splat(1.0)));
     let ball = meshes.add(Sphere::new(0.4).mesh().uv(32, 16));
     commands.spawn((Name::new("floor"), Weatherable::default(), Mesh3d(floor)));
     let small = Weatherable { map_size: 256, ..default() };
     commands.spawn((Name::new("ball"), small, Mesh3d(ball), Transform::from_xyz(0.0, 0.6, 0.0)));
-    commands.spawn((
-        Emitter {
-            effect: effects.add(WeatherEffect { drops: DropSizes::MarshallPalmer(10.0), ..default() }),
-            rate: 2000.0,
-            shape: EmitterShape::Sky { half_size: Vec2::splat(1.0) },
-            flow: Flow::MmPerHour(10.0),
-            speed: 0.0,
-            enabled: false,
-            ..default()
-        },
-        Transform::from_xyz(0.0, 3.0, 0.0),
-    ));
+    let rain = Emitter::rain(assets.load(WeatherEffect::RAIN), 10.0, Vec2::splat(1.0));
+    commands.spawn((Emitter { rate: 2000.0, enabled: false, ..rain }, Transform::from_xyz(0.0, 3.0, 0.0)));
 }
 
-/// Meshes are measured in the background. What falls before that hits nothing.
-fn begin(wetness: WetnessQuery, surfaces: Query<Entity, With<Weatherable>>, mut rain: Single<&mut Emitter>) {
+/// Meshes are measured and effects loaded in the background. What falls before that hits nothing.
+fn begin(
+    assets: Res<AssetServer>,
+    surfaces: Query<(), With<Weatherable>>,
+    mut ready: MessageReader<SurfaceReady>,
+    mut count: Local<usize>,
+    mut rain: Single<&mut Emitter>,
+) {
+    *count += ready.read().count();
     if !rain.enabled {
-        rain.enabled = surfaces.iter().all(|surface| wetness.over(surface).is_some());
+        rain.enabled = *count == surfaces.iter().count() && assets.is_loaded(&rain.effect);
     }
 }
 

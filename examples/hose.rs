@@ -37,7 +37,7 @@ fn setup(
     ));
 
     // 15 litres a minute through a nozzle of 6 mm leave it at 8.8 m/s, in 1500 slugs a second.
-    let water = assets.load("effects/hose.effect.ron");
+    let water = assets.load(WeatherEffect::HOSE);
     commands.spawn((
         Emitter { rate: 1500.0, spread: 0.03, enabled: false, ..Emitter::hose(water, 15.0, 0.006) },
         Transform::from_xyz(0.6, 1.3, 2.2),

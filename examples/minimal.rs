@@ -9,24 +9,17 @@ fn main() {
 
 fn setup(
     mut commands: Commands,
+    assets: Res<AssetServer>,
     mut meshes: ResMut<Assets<Mesh>>,
     mut materials: ResMut<Assets<StandardMaterial>>,
-    mut effects: ResMut<Assets<WeatherEffect>>,
 ) {
     // A scene as any other. What is `Weatherable` gets wet where it is hit.
     let clay = materials.add(Color::linear_rgb(0.5, 0.23, 0.13));
     commands.spawn((Weatherable::default(), Mesh3d(meshes.add(Sphere::new(1.0))), MeshMaterial3d(clay)));
 
-    // A hose that points at it. Its water is a `WeatherEffect`: load one, or make one.
-    commands.spawn((
-        Emitter {
-            effect: effects.add(WeatherEffect { stamp_radius: Some(0.05), volume_mm3: 500.0, ..default() }),
-            shape: EmitterShape::Cone { radius: 0.01 },
-            spread: 0.05,
-            ..default()
-        },
-        Transform::from_xyz(2.0, 1.5, 3.0).looking_at(Vec3::Y, Vec3::Y),
-    ));
+    // A shower of 60 mm/h, on 3 m by 3 m. Its drops are a `WeatherEffect` that is built in; yours may be a file, or made in code.
+    let rain = Emitter::rain(assets.load(WeatherEffect::RAIN), 60.0, Vec2::splat(1.5));
+    commands.spawn((rain, Transform::from_xyz(0.0, 4.0, 0.0)));
 
     commands.spawn((
         DirectionalLight::default(),

@@ -26,17 +26,8 @@ fn setup(
         Mesh3d(meshes.add(Plane3d::new(Vec3::Y, Vec2::splat(1.0)))),
         MeshMaterial3d(materials.add(Color::linear_rgb(0.5, 0.23, 0.13))),
     ));
-    commands.spawn((
-        Emitter {
-            effect: assets.load("effects/rain.effect.ron"),
-            rate: 3000.0,
-            shape: EmitterShape::Sky { half_size: Vec2::splat(1.0) },
-            flow: Flow::MmPerHour(100.0),
-            speed: 0.0,
-            ..default()
-        },
-        Transform::from_xyz(0.0, 2.0, 0.0),
-    ));
+    let rain = Emitter::rain(assets.load(WeatherEffect::RAIN), 100.0, Vec2::splat(1.0));
+    commands.spawn((rain, Transform::from_xyz(0.0, 2.0, 0.0)));
     commands.spawn((
         DirectionalLight::default(),
         Transform::default().looking_to(Vec3::new(-0.5, -1.0, -0.5), Vec3::Y),

@@ -40,9 +40,9 @@ fn reed() -> Mesh {
 
 fn setup(
     mut commands: Commands,
+    assets: Res<AssetServer>,
     mut meshes: ResMut<Assets<Mesh>>,
     mut materials: ResMut<Assets<StandardMaterial>>,
-    mut effects: ResMut<Assets<WeatherEffect>>,
     mut bind_poses: ResMut<Assets<SkinnedMeshInverseBindposes>>,
 ) {
     // As a glTF scene would spawn it: a mesh, and joints that are animated. `Weatherable` is all that it takes.
@@ -60,17 +60,8 @@ fn setup(
         NoFrustumCulling,
     ));
 
-    commands.spawn((
-        Emitter {
-            effect: effects.add(WeatherEffect::default()),
-            rate: 3000.0,
-            shape: EmitterShape::Sky { half_size: Vec2::splat(1.5) },
-            flow: Flow::MmPerHour(60.0),
-            speed: 0.0,
-            ..default()
-        },
-        Transform::from_xyz(0.0, 3.0, 0.0),
-    ));
+    let rain = Emitter::rain(assets.load(WeatherEffect::RAIN), 60.0, Vec2::splat(1.5));
+    commands.spawn((rain, Transform::from_xyz(0.0, 3.0, 0.0)));
 
     commands.spawn((
         DirectionalLight::default(),

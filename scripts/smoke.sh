@@ -116,6 +116,9 @@ shot "a stroke taken back"
 # Probe, maps, plots, help; all panels by their tabs, which lie in the first rows of the left panel.
 xdotool key i mousemove 640 360 click 1 key m key p
 shot "maps and plots"
+xdotool key v
+shot "how wet surfaces are, in false colours"
+xdotool key v key v key v key v
 for x in 30 80 130 190 250; do
     for y in 52 74; do
         xdotool mousemove "${x}" "${y}" click 1

@@ -1,3 +1,19 @@
+// The README's links are relative to the repository, and would lead nowhere from its documentation. Of two definitions of a
+// link Markdown takes the first, so these come before its own.
+//! [hose picture]: https://raw.githubusercontent.com/bevy-weathering/bevy_weathering/main/docs/pictures/hose.png
+//! [vase picture]: https://raw.githubusercontent.com/bevy-weathering/bevy_weathering/main/docs/pictures/vase.png
+//! [minimal]: https://github.com/bevy-weathering/bevy_weathering/blob/main/examples/minimal.rs
+//! [guide]: https://github.com/bevy-weathering/bevy_weathering/blob/main/docs/README.md
+//! [gallery]: https://github.com/bevy-weathering/bevy_weathering/blob/main/GALLERY.md
+//! [scenarios]: https://github.com/bevy-weathering/bevy_weathering/blob/main/docs/scenarios.md
+//! [batch]: https://github.com/bevy-weathering/bevy_weathering/blob/main/docs/batch.md
+//! [export]: https://github.com/bevy-weathering/bevy_weathering/blob/main/docs/export.md
+//! [sandbox]: https://github.com/bevy-weathering/bevy_weathering/blob/main/docs/sandbox.md
+//! [notes]: https://github.com/bevy-weathering/bevy_weathering/blob/main/benches/NOTES.md
+//! [hose scenario]: https://github.com/bevy-weathering/bevy_weathering/blob/main/assets/scenarios/hose.ron
+//! [architecture]: https://github.com/bevy-weathering/bevy_weathering/blob/main/ARCHITECTURE.md
+//! [credits]: https://github.com/bevy-weathering/bevy_weathering/blob/main/assets/CREDITS.md
+//!
 #![doc = include_str!("../README.md")]
 
 pub mod bake;
@@ -10,6 +26,7 @@ pub mod export;
 mod input;
 pub mod material;
 pub mod matter;
+pub mod offscreen;
 pub mod output;
 pub mod overlay;
 pub mod overload;
@@ -46,7 +63,7 @@ pub mod prelude {
     pub use crate::particle::Forces;
     pub use crate::schedule::{WeatheringSystems, WeatheringTick};
     pub use crate::weather::Weather;
-    pub use crate::wetting::{BecameWet, Dried, WatchWetness, WetnessQuery};
+    pub use crate::wetting::{BecameWet, Dried, SurfaceReady, SurfaceRefused, WatchWetness, WetnessQuery};
 }
 
 /// Everything: particles, collision, splats, wet materials. Each part can be left out or replaced.

@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test fails by panicking")]
 
+/// What a Bevy app meets: what is built in, what is told, where links lead.
+mod api;
 /// Closest hits against brute force.
 mod collision;
 /// Random numbers and meshes for the other modules.
@@ -69,6 +71,8 @@ mod save;
 mod schedule;
 /// Marks across the borders of uv islands.
 mod seams;
+/// Which emitter wetted what.
+mod sources;
 /// Events of scenarios, includes, variants, checks.
 mod timeline;
 /// The smaller tools of the program.

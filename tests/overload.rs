@@ -213,6 +213,35 @@ fn a_frame_that_took_long_is_not_made_up_for() {
 }
 
 #[test]
+fn a_hundred_times_as_fast_is_as_fast_as_the_budget_lets_it_be() {
+    let mut scene = Scene::new(HZ);
+    LiveBudgetPlugin.build(&mut scene.0);
+    let work = || std::thread::sleep(Duration::from_millis(10));
+    scene
+        .0
+        .insert_resource(LiveBudget { frame_ms: 100.0, ..default() })
+        .add_systems(WeatheringTick, work.in_set(WeatheringSystems::Last));
+    // What a tick takes is known.
+    scene.0.update();
+    scene.run(3);
+    scene.0.world_mut().resource_mut::<Time<Virtual>>().set_relative_speed(100.0);
+    scene.0.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_micros(16_667)));
+    let tick = |scene: &Scene| scene.0.world().resource::<WeatheringClock>().tick();
+    let mut counts = Vec::new();
+    for _ in 0..8 {
+        let before = tick(&scene);
+        scene.0.update();
+        counts.push(tick(&scene) - before);
+    }
+    // Not the hundred that were asked for, and never none.
+    assert!(counts.iter().all(|count| (1..=11).contains(count)), "{counts:?}");
+    let load = *scene.0.world().resource::<LiveLoad>();
+    assert!(load.speed < 0.6, "{load:?}");
+    // Nobody else has slowed it down.
+    assert_eq!(scene.0.world().resource::<Time<Virtual>>().relative_speed(), 100.0);
+}
+
+#[test]
 fn what_watches_the_time_leaves_no_order_open() {
     let mut scene = Scene::new(HZ);
     LiveBudgetPlugin.build(&mut scene.0);

@@ -31,14 +31,18 @@ fn unwrapped(axis: Axis, texel: i32) -> i32 {
     if axis.clamped {
         return texel;
     }
+    // At most one map before the texel, and less than one behind it: a remainder without a division.
     let first = (axis.center - axis.radius) >> 8u;
-    return first + (texel - first + 2 * axis.size) % axis.size;
+    let onward = texel - first;
+    let ahead = onward + select(0, axis.size, onward < 0);
+    return first + ahead - select(0, axis.size, ahead >= axis.size);
 }
 
-// Distance of the texel's middle from the stamp's along one axis; 256 is the radius.
+// Distance of the texel's middle from the stamp's along one axis, to the nearest; 256 is the radius.
 fn axis_offset(axis: Axis, texel: i32) -> i32 {
     let from_center = unwrapped(axis, texel) * SUBTEXELS + SUBTEXELS / 2 - axis.center;
-    return clamp(from_center, -2 * axis.radius, 2 * axis.radius) * 256 / axis.radius;
+    let near = clamp(from_center, -2 * axis.radius, 2 * axis.radius);
+    return (near * ((1 << 29u) / axis.radius) + (1 << 20u)) >> 21u;
 }
 
 // The dome (1 - d^2)^2 at an offset in 1/256 radius: 0..=4096.
@@ -53,9 +57,23 @@ fn stamp_alpha(opacity: u32, dome: u32) -> u32 {
     return (opacity * dome + 2048u) >> 12u;
 }
 
-// One channel over another, 0..=255, premultiplied.
-fn blend_over(source: u32, alpha: u32, under: u32) -> u32 {
-    return (source * alpha + under * (255u - alpha) + 127u) / 255u;
+// Two bytes in a number, each in its half.
+const PAIR: u32 = 0x00ff00ffu;
+
+// Red and blue, green and alpha of a colour.
+fn pairs(bytes: vec4<u32>) -> vec2<u32> {
+    return bytes.rg | (bytes.ba << vec2(16u));
+}
+
+fn unpaired(pairs: vec2<u32>) -> vec4<u32> {
+    return vec4(pairs & vec2(PAIR & 0xffffu), pairs >> vec2(16u));
+}
+
+// Four channels over others, 0..=255, premultiplied, two in each multiplication: the twin of `blend_over`, which divides by 255;
+// so does, rounded to the nearest, the sum of what is shifted here.
+fn blend_pairs(source: vec2<u32>, alpha: u32, under: vec2<u32>) -> vec2<u32> {
+    let mixed = source * alpha + under * (255u - alpha) + 0x00800080u;
+    return ((mixed + ((mixed >> vec2(8u)) & vec2(PAIR))) >> vec2(8u)) & vec2(PAIR);
 }
 
 // The slope of a dome of height `bump` (-127..=127) at an offset, as a colour: 128 is flat.
@@ -104,10 +122,15 @@ fn lay_stamp(channel: u32, tint: u32, opacity: u32, weight: u32, under: u32) -> 
     return (channel * tint * opacity + under * (65025u - weight) + 32512u) / 65025u;
 }
 
+// From `dot_axes` to 1/1024: 16,129 is 1023.
+fn axes_part(product: i32) -> i32 {
+    return (product * 65) >> 10u;
+}
+
 // A slope of a stamp as a premultiplied colour.
-fn stamp_slope(slopes: vec2<i32>, along: vec2<i32>, unit: i32, bump: i32, coverage: u32) -> u32 {
+fn stamp_slope(slopes: vec2<i32>, along: vec2<i32>, bump: i32, coverage: u32) -> u32 {
     let level = (128u * coverage + 127u) / 255u;
-    let slope = (slopes.x * along.x + slopes.y * along.y) / unit * bump / 127;
+    let slope = turned(along, slopes) * bump / 127;
     return u32(clamp(i32(level) + slope, 0, i32(coverage)));
 }
 

@@ -224,18 +224,24 @@ struct Held {
 const MARK_FULL_MM: f32 = 2.0;
 const TIDE_PER_CYCLE: f32 = 0.35;
 
-// A texel of the state; tiles lie one after the other.
-fn texel_held(texel: vec2<i32>) -> Held {
+// Where the state and the matter of a texel are stored: tile after tile, each row by row.
+fn texel_index(texel: vec2<i32>) -> i32 {
     let size = i32(porous.size);
     let x = wrapped(texel.x, size, has_flag(FLAG_CLAMP_U));
     let y = wrapped(texel.y, size, has_flag(FLAG_CLAMP_V));
     let tile = (y / TILE_SIZE) * (size / TILE_SIZE) + x / TILE_SIZE;
-    let stored = state[tile * TILE_SIZE * TILE_SIZE + (y % TILE_SIZE) * TILE_SIZE + x % TILE_SIZE];
+    return tile * TILE_SIZE * TILE_SIZE + (y % TILE_SIZE) * TILE_SIZE + x % TILE_SIZE;
+}
+
+// What a texel holds now.
+fn texel_held(texel: vec2<i32>) -> Held {
+    let index = texel_index(texel);
+    let stored = state[index];
     var held: Held;
     let marks = unpack4x8unorm(stored.marks);
     held.marks = marks.xy;
 #ifdef WEATHERED_MATTER
-    held.matter = matter_depths(matter[tile * TILE_SIZE * TILE_SIZE + (y % TILE_SIZE) * TILE_SIZE + x % TILE_SIZE]);
+    held.matter = matter_depths(matter[index]);
 #endif
     if stored.tick == 0u || stored.tick > clock.tick {
         return held;
@@ -278,11 +284,7 @@ fn held_at(uv: vec2<f32>) -> Held {
 
 // Depth of snow and soil at a texel, mm, for slopes; below 0 where the mesh does not lie.
 fn heap_mm(texel: vec2<i32>) -> f32 {
-    let size = i32(porous.size);
-    let x = wrapped(texel.x, size, has_flag(FLAG_CLAMP_U));
-    let y = wrapped(texel.y, size, has_flag(FLAG_CLAMP_V));
-    let tile = (y / TILE_SIZE) * (size / TILE_SIZE) + x / TILE_SIZE;
-    let stored = matter[tile * TILE_SIZE * TILE_SIZE + (y % TILE_SIZE) * TILE_SIZE + x % TILE_SIZE];
+    let stored = matter[texel_index(texel)];
     let depths = matter_depths(stored);
     return select(-1.0, depths.x + depths.y + depths.z, lies(stored));
 }

@@ -10,17 +10,11 @@ use crate::collision::MeshTriangles;
 use crate::overlay::Wrap;
 use crate::wetting::TexelGeometry;
 
-/// The columns, or rows, from one uv to another, in a map of so many texels. Those beyond it go where [`Wrap`] says; none
-/// comes twice.
+/// The columns, or rows, from one uv to another, in a map of so many texels.
 fn cells(from: f32, to: f32, size: u32, wrap: Wrap) -> impl Iterator<Item = u32> + Clone {
-    let side = i64::from(size);
     // The conversion saturates, and takes NaN for 0.
-    let [first, last] = [from, to].map(|uv| (uv * size as f32).floor() as i64);
-    let (first, last) = match wrap {
-        Wrap::Repeat => (first, last.min(first.saturating_add(side - 1))),
-        Wrap::Clamp => (first.clamp(0, side - 1), last.clamp(0, side - 1)),
-    };
-    (first..=last).map(move |cell| cell.rem_euclid(side) as u32)
+    let [first, last] = [from, to].map(|uv| (uv * size as f32).floor() as i32);
+    wrap.cells(first, last, size)
 }
 
 /// Whether a ball reaches the box around three points.

@@ -137,71 +137,38 @@ pub fn paint_strokes(mut queue: ResMut<BrushQueue>, mut surfaces: BrushSurfaces)
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
-    use bevy::math::Vec2;
-
     use super::*;
-    use crate::overlay::{Weatherable, Wrap};
-    use crate::wetting::TexelGeometry;
+    use crate::matter::test_world::{Ground, Place, assert_balanced};
 
     /// A floor of a square metre with 64 texels a side, in still and dry air that takes nothing.
     struct Floor {
-        triangles: MeshTriangles,
-        geometry: Arc<TexelGeometry>,
-        material: PorousMaterial,
-        drying: DryingClock,
-        water: SurfaceWater,
-        matter: SurfaceMatter,
+        place: Place,
+        ground: Ground,
     }
 
     impl Floor {
         fn new() -> Self {
-            let at = |uv: Vec2| Vec3::new(uv.x, 0.0, uv.y);
-            let [a, b, c, d] = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
-            let corners = [[a, c, b], [a, d, c]];
-            let triangles = MeshTriangles {
-                positions: corners.map(|corners| corners.map(at)).to_vec(),
-                uvs: corners.to_vec(),
-                source: vec![0, 1],
-                ..Default::default()
-            };
-            let wrap = [Wrap::Clamp; 2];
-            let geometry = TexelGeometry::new(&triangles, &Affine3A::IDENTITY, Vec3::Y, 64, wrap);
-            let maps = Weatherable { map_size: 64, wrap_u: wrap[0], wrap_v: wrap[1], ..default() };
-            let mut drying = DryingClock::default();
-            drying.change(&Weather { drying_speed: 0.0, ..default() }, 0, 60);
-            Self {
-                water: SurfaceWater::new(&maps, geometry.mean_mm2()),
-                matter: SurfaceMatter::default(),
-                material: PorousMaterial { capacity_mm: 0.0, ..default() },
-                geometry: Arc::new(geometry),
-                drying,
-                triangles,
-            }
+            let mut place = Place::flat(64, 1.0 / 64.0);
+            place.material = PorousMaterial { capacity_mm: 0.0, ..default() };
+            Self { ground: Ground::dry(&place), place }
         }
 
         fn paint(&mut self, kind: BrushKind, strength: f32) -> u32 {
             let brush = Brush { kind, point: Vec3::new(0.5, 0.0, 0.5), radius: 0.2, strength };
-            let now = Now::new(7, 60, &self.drying, &self.geometry, None, &self.material);
-            let weather = Weather::default();
-            let (water, matter) = (&mut self.water, &mut self.matter);
-            let canvas = Canvas { water, matter, now: &now, weather: &weather };
-            canvas.paint(&brush, &self.triangles, &Affine3A::IDENTITY, &mut Vec::new())
+            let now = self.place.now(7);
+            let (water, matter) = (&mut self.ground.water, &mut self.ground.matter);
+            let canvas = Canvas { water, matter, now: &now, weather: &self.place.weather };
+            canvas.paint(&brush, &self.place.triangles, &Affine3A::IDENTITY, &mut Vec::new())
         }
 
         fn film(&self) -> u64 {
-            self.water.texels().iter().map(|texel| u64::from(texel.film)).sum()
+            self.ground.water.texels().iter().map(|texel| u64::from(texel.film)).sum()
         }
 
         fn assert_balanced(&self) {
-            let (water, matter) = (self.water.ledger(), self.matter.ledger());
-            assert_eq!(water.received + water.painted, self.film() + water.spilled + water.wiped);
-            let stock = self.matter.stock();
-            assert_eq!(
-                matter.received_dust + matter.received_mud,
-                stock.dust + stock.mud + matter.washed_off + matter.wiped
-            );
+            let ledger = self.ground.water.ledger();
+            assert_eq!(ledger.received + ledger.painted, self.film() + ledger.spilled + ledger.wiped);
+            assert_balanced(&self.ground.matter);
         }
     }
 
@@ -212,22 +179,22 @@ mod tests {
         floor.assert_balanced();
         // The integral of (1 - (d/r)²)² over the disc is a third of its area.
         let expected = 0.5 * std::f64::consts::PI * 200.0 * 200.0 / 3.0;
-        let painted = floor.water.units().mm3(floor.water.ledger().painted);
+        let painted = floor.ground.water.units().mm3(floor.ground.water.ledger().painted);
         assert!((painted / expected - 1.0).abs() < 0.01, "{painted} {expected}");
-        assert!(!floor.water.is_at_rest() && !floor.water.tiles.dirty.is_empty());
+        assert!(!floor.ground.water.is_at_rest() && !floor.ground.water.tiles.dirty.is_empty());
     }
 
     #[test]
     fn what_is_dried_is_gone_and_booked() {
         let mut floor = Floor::new();
         assert!(floor.paint(BrushKind::Dry, 1.0) > 0, "texels lie there");
-        assert_eq!(floor.water.ledger().wiped, 0, "but nothing was on them");
+        assert_eq!(floor.ground.water.ledger().wiped, 0, "but nothing was on them");
         floor.paint(BrushKind::Wet, 0.5);
         let before = floor.film();
         floor.paint(BrushKind::Dry, 1.0);
         floor.assert_balanced();
-        assert!(floor.film() < before / 2 && floor.water.ledger().wiped > before / 2);
-        let middle = floor.water.texels()[32 * 64 + 32];
+        assert!(floor.film() < before / 2 && floor.ground.water.ledger().wiped > before / 2);
+        let middle = floor.ground.water.texels()[32 * 64 + 32];
         assert!(f64::from(middle.film) < 0.02 * before as f64 / 400.0, "{middle:?}");
     }
 
@@ -235,19 +202,19 @@ mod tests {
     fn dust_is_loose_on_dry_ground_and_bound_on_wet_and_can_be_cleaned_off() {
         let mut floor = Floor::new();
         floor.paint(BrushKind::Clean, 1.0);
-        assert!(floor.matter.is_empty());
+        assert!(floor.ground.matter.is_empty());
         floor.paint(BrushKind::Dirty, 0.1);
-        let stock = floor.matter.stock();
+        let stock = floor.ground.matter.stock();
         assert!(stock.dust > 0 && stock.mud == 0, "{stock:?}");
         floor.paint(BrushKind::Wet, 1.0);
         floor.paint(BrushKind::Dirty, 0.1);
         floor.assert_balanced();
-        assert!(floor.matter.stock().mud > 0);
-        let before = floor.matter.stock();
+        assert!(floor.ground.matter.stock().mud > 0);
+        let before = floor.ground.matter.stock();
         floor.paint(BrushKind::Clean, 0.5);
         floor.assert_balanced();
-        let after = floor.matter.stock();
+        let after = floor.ground.matter.stock();
         assert!(after.dust + after.mud < before.dust + before.mud && after.dust + after.mud > 0);
-        assert_eq!(floor.matter.ledger().wiped, before.dust + before.mud - after.dust - after.mud);
+        assert_eq!(floor.ground.matter.ledger().wiped, before.dust + before.mud - after.dust - after.mud);
     }
 }

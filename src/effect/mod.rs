@@ -1,11 +1,12 @@
 //! What falls: rain, a hose, dust, as data.
 //!
 //! A [`WeatherEffect`] says how a particle flies and what it leaves where it hits. Effects are RON assets
-//! (`*.effect.ron`); a new effect needs no Rust. Particles do not hold handles: each holds an index into the
-//! [`EffectTable`], whose rows are plain numbers that the hot loops read.
+//! (`*.effect.ron`); a new effect needs no Rust. Some are built in ([`ShippedEffect`]). Particles do not hold handles: each holds an
+//! index into the [`EffectTable`], whose rows are plain numbers that the hot loops read.
 
 pub mod drops;
 mod loader;
+mod shipped;
 mod stamp;
 mod table;
 
@@ -18,6 +19,7 @@ use crate::stamps::StampSet;
 
 pub use drops::DropSizes;
 pub use loader::{EffectError, WeatherEffectLoader};
+pub use shipped::ShippedEffect;
 pub use stamp::{StampSource, StampTurn};
 pub use table::{EffectIndex, EffectRow, EffectTable};
 
@@ -41,7 +43,7 @@ pub struct WeatherEffect {
     pub splash: f32,
     /// Multiplies gravity: 1 falls, 0 floats.
     pub gravity_scale: f32,
-    /// Shapes of the mark on the surface. An effect made in code has domes until [`Self::with_stamps`] was called.
+    /// Shapes of the mark on the surface. Of an effect made in code, stamps of a kind are made when it is first used.
     pub stamps: StampSource,
     /// Radius of the mark of a particle with `volume_mm3` or more, in metres; with less it is smaller, by (V/V₀)^(5/12), as drops of
     /// one speed spread. Not given: of a round patch as large as what its drops spread to ([`spread_mm`](drops::spread_mm)), all
@@ -62,7 +64,8 @@ pub struct WeatherEffect {
     pub bump: f32,
     /// How the particle itself looks.
     pub look: ParticleLook,
-    /// The stamps of `stamps`. Loaded with the effect; for one made in code, see [`Self::with_stamps`].
+    /// The stamps of `stamps`, if they are there: loaded with the effect, or made ahead by [`Self::with_stamps`]. While this is
+    /// `None`, those of `stamps` are made where they are needed.
     #[serde(skip)]
     #[reflect(ignore)]
     pub stamp_set: Option<Arc<StampSet>>,
@@ -192,7 +195,7 @@ impl Default for ParticleLook {
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct RefreshEffects;
 
-/// Registers the asset, its loader and the [`EffectTable`].
+/// Registers the asset, its loader, the effects that are built in, and the [`EffectTable`].
 pub struct EffectPlugin;
 
 impl Plugin for EffectPlugin {
@@ -202,5 +205,6 @@ impl Plugin for EffectPlugin {
             .register_asset_reflect::<WeatherEffect>()
             .init_resource::<EffectTable>()
             .add_systems(PreUpdate, table::refresh_effect_table.in_set(RefreshEffects));
+        shipped::embed(app.world());
     }
 }

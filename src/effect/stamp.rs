@@ -85,6 +85,14 @@ impl StampSource {
         let set = StampSet::from_images(diffuse.as_ref(), specular.as_ref(), normal.as_ref(), *variants)?;
         Ok(Some(Arc::new(set)))
     }
+
+    /// The stamps of an effect that came without any; none of a dome, and none, with a warning, where files would be needed.
+    pub(super) fn made(&self) -> Option<Arc<StampSet>> {
+        self.read(&BTreeMap::new()).unwrap_or_else(|error| {
+            warn!("an effect made in code paints domes, as images are only read beside a file of its own: {error}");
+            None
+        })
+    }
 }
 
 /// The largest strip: 16 stamps of 256 texels.
@@ -102,7 +110,7 @@ fn decoded(file: &str, bytes: &[u8]) -> Result<RgbaStrip, EffectError> {
 }
 
 impl WeatherEffect {
-    /// Gives an effect made in code the stamps of its kind; loaded ones have theirs.
+    /// Makes the stamps of its kind now, rather than in the frame in which it is first used; loaded effects have theirs.
     ///
     /// # Errors
     /// As [`StampSource::read`].

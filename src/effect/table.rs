@@ -1,5 +1,7 @@
 //! Effects as rows of numbers, for loops over particles and impacts.
 
+use std::sync::Arc;
+
 use bevy::prelude::*;
 
 use super::WeatherEffect;
@@ -22,17 +24,24 @@ pub struct EffectRow {
     /// Numbers of its stamps in the [`StampAtlas`](crate::overlay::StampAtlas): the first, and how many
     /// variants there are.
     pub stamps: (u32, u32),
+    /// The effect's own, or made for it; none of domes.
+    stamp_set: Option<Arc<StampSet>>,
 }
 
 impl EffectRow {
     fn new(handle: Handle<WeatherEffect>) -> Self {
-        Self { handle, effect: None, diameters_mm: [0.0; SIZE_CLASSES], stamps: (0, 0) }
+        Self { handle, effect: None, diameters_mm: [0.0; SIZE_CLASSES], stamps: (0, 0), stamp_set: None }
     }
 
     fn set(&mut self, effect: WeatherEffect) {
         self.diameters_mm = effect.drops.diameters_mm();
-        if self.effect.as_ref().is_none_or(|old| old.stamp_set != effect.stamp_set) {
-            self.stamps = (0, 0);
+        let source = |effect: &WeatherEffect| (effect.stamps.clone(), effect.stamp_set.clone());
+        // Stamps are not made again with every other edit.
+        if self.effect.as_ref().is_none_or(|old| source(old) != source(&effect)) {
+            let set = effect.stamp_set.clone().or_else(|| effect.stamps.made());
+            if self.stamp_set != set {
+                (self.stamp_set, self.stamps) = (set, (0, 0));
+            }
         }
         self.effect = Some(effect);
     }
@@ -76,10 +85,15 @@ impl EffectTable {
         self.rows.get(usize::from(index.0)).filter(|row| row.effect.is_some())
     }
 
+    /// Whether this effect is there.
+    pub(crate) fn has(&self, handle: &Handle<WeatherEffect>) -> bool {
+        self.rows.iter().any(|row| row.handle == *handle && row.effect.is_some())
+    }
+
     /// Rows whose stamps have no numbers yet.
     pub(crate) fn without_stamps(&mut self) -> impl Iterator<Item = (&mut (u32, u32), &StampSet)> {
         self.rows.iter_mut().filter(|row| row.stamps.1 == 0).filter_map(|row| {
-            let set = row.effect.as_ref()?.stamp_set.as_deref()?;
+            let set = row.stamp_set.as_deref()?;
             Some((&mut row.stamps, set))
         })
     }
@@ -123,5 +137,54 @@ pub fn refresh_effect_table(
     let unloaded = table.rows.iter().any(|row| row.effect.is_none());
     if events.read().count() > 0 || unloaded {
         table.refresh(&effects);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::{StampSource, StampTurn};
+    use crate::stamps::StampKind;
+
+    /// How many rows wait for numbers, which they get.
+    fn numbered(table: &mut EffectTable) -> usize {
+        let mut count = 0;
+        for (numbers, set) in table.without_stamps() {
+            *numbers = (1, set.variants.len() as u32);
+            count += 1;
+        }
+        count
+    }
+
+    #[test]
+    fn an_effect_made_in_code_has_the_stamps_of_its_kind() {
+        let mut table = EffectTable::default();
+        let of_kind =
+            |kind| WeatherEffect { stamps: StampSource::Kind(kind), stamp_radius: Some(0.02), ..default() };
+        let splat = of_kind(StampKind::Splat);
+        assert!(splat.stamp_set.is_none());
+        table.insert(Handle::default(), splat.clone()).unwrap();
+        assert_eq!((numbered(&mut table), table.rows()[0].stamps), (1, (1, 4)));
+
+        // Any other edit leaves them as they are, and so does asking for the same ones ahead.
+        let turned = WeatherEffect { stamp_turn: StampTurn::Flight, ..splat };
+        table.insert(Handle::default(), turned.clone());
+        assert_eq!(numbered(&mut table), 0);
+        table.insert(Handle::default(), turned.with_stamps().unwrap());
+        assert_eq!(numbered(&mut table), 0);
+
+        table.insert(Handle::default(), of_kind(StampKind::Drop));
+        assert_eq!(numbered(&mut table), 1);
+        table.insert(Handle::default(), WeatherEffect::default());
+        assert_eq!((numbered(&mut table), table.rows()[0].stamps), (0, (0, 0)));
+    }
+
+    #[test]
+    fn images_that_are_not_there_make_domes() {
+        let mut table = EffectTable::default();
+        let diffuse = Some("spots.png".into());
+        let stamps = StampSource::Images { diffuse, specular: None, normal: None, variants: 1 };
+        table.insert(Handle::default(), WeatherEffect { stamps, ..default() });
+        assert_eq!((numbered(&mut table), table.rows()[0].stamps), (0, (0, 0)));
     }
 }

@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::detail::Deal;
 use super::shape::unit;
-use super::{EmissionDetail, EmissionSeed, Emitter};
+use super::sources::Births;
+use super::{EmissionDetail, EmissionSeed, Emitter, Source, TrackSources};
 use crate::clock::WeatheringClock;
 use crate::effect::drops::SIZE_CLASSES;
 use crate::effect::{DropSizes, EffectIndex, EffectTable, WeatherEffect};
@@ -23,6 +24,9 @@ pub struct EmitterState {
     #[serde(default)]
     held_nl: f64,
     rng: Option<Pcg32>,
+    /// Its number, where sources are tracked.
+    #[serde(skip)]
+    source: Source,
     /// Particles sent out so far.
     pub emitted: u64,
 }
@@ -85,6 +89,7 @@ impl EmitterState {
 pub struct NewParticles {
     particles: Vec<Particle>,
     next_sequence: u32,
+    births: Births,
 }
 
 impl NewParticles {
@@ -92,6 +97,7 @@ impl NewParticles {
     pub fn restart(&mut self) {
         self.particles.clear();
         self.next_sequence = 0;
+        self.births = Births::default();
     }
 
     /// The number of the next particle.
@@ -108,11 +114,24 @@ impl NewParticles {
     pub(crate) fn restore(&mut self, waiting: Vec<Particle>, next_sequence: u32) {
         self.particles = waiting;
         self.next_sequence = next_sequence;
+        self.births = Births::default();
+    }
+
+    /// Whose everything is that is added from now on.
+    pub(crate) fn attribute_to(&mut self, source: Source) {
+        self.births.attribute_to(source);
+    }
+
+    /// Whose a particle is that is in flight, or was until this tick; unknown unless sources are tracked.
+    pub(crate) fn source_of(&self, sequence: Sequence) -> Source {
+        self.births.source_of(sequence.0, self.next_sequence)
     }
 
     /// Adds one more particle, which gets the next number.
     pub fn push(&mut self, particle: impl FnOnce(Sequence) -> Particle) {
-        self.particles.push(particle(Sequence(self.next_sequence)));
+        let particle = particle(Sequence(self.next_sequence));
+        self.births.note(self.next_sequence, particle.lifespan.ticks_left);
+        self.particles.push(particle);
         self.next_sequence = self.next_sequence.wrapping_add(1);
     }
 }
@@ -142,11 +161,13 @@ pub fn emit_particles(
     mut counts: ResMut<ParticleCounts>,
     mut water: ResMut<WaterCounts>,
     mut new: ResMut<NewParticles>,
+    mut track: Option<ResMut<TrackSources>>,
     mut order: Local<Vec<(u32, Entity)>>,
     mut turns: Local<Vec<Turn>>,
     mut emitters: Query<(&Emitter, &mut EmitterState, &GlobalTransform)>,
     streams: Query<(&Emitter, Entity)>,
 ) {
+    new.births.begin_tick(track.is_some(), clock.tick());
     order.clear();
     order.extend(streams.iter().map(|(emitter, id)| (emitter.stream, id)));
     order.sort_unstable();
@@ -190,6 +211,10 @@ pub fn emit_particles(
             each_nl
         };
         state.emitted += u64::from(count);
+        if let Some(track) = &mut track {
+            state.source = track.bypass_change_detection().number(turn.emitter, state.source);
+            new.attribute_to(state.source);
+        }
 
         let world_from_emitter = transform.affine();
         let ticks_left = (emitter.lifetime * clock.hz() as f32).ceil().max(1.0);
@@ -219,6 +244,8 @@ pub fn emit_particles(
         }
         state.rng = Some(rng);
     }
+    // What others add is not an emitter's.
+    new.attribute_to(Source::UNKNOWN);
 }
 
 /// Spawns what [`emit_particles`] wrote, in one batch.

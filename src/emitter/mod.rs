@@ -4,11 +4,17 @@
 //! (local -Z). How many it owes is kept as an exact remainder: 1,000/s for 10 s are 10,000 particles at any tick
 //! rate. Within a tick they are born evenly spread, so a jet is a jet and no row of clouds. Where there is no room for
 //! all, fewer stand for more ([`EmissionDetail`]). Each emitter has its own random stream, seeded by [`EmissionSeed`]
-//! and the emitter's number; nothing else draws from it.
+//! and the emitter's number; nothing else draws from it. Which emitter it was that wetted a place is known to those who ask
+//! ([`TrackSources`]).
+//!
+//! [`Emitter::hose`], [`Emitter::rain`], [`Emitter::snow`] and [`Emitter::dust`] are what is wanted most.
 
 mod detail;
 mod emit;
 mod shape;
+mod silent;
+mod sky;
+mod sources;
 
 use bevy::prelude::*;
 use schemars::JsonSchema;
@@ -19,13 +25,16 @@ use crate::schedule::{WeatheringSystems, WeatheringTick};
 
 pub use detail::EmissionDetail;
 pub use emit::{EmitterState, NewParticles, emit_particles, spawn_particles};
+pub use silent::NotEmitting;
+pub use sources::{Source, TrackSources};
 
 /// Sends out particles of one effect. Configuration only; see [`EmitterState`] for what it has done.
 #[derive(Component, Reflect, Debug, Clone)]
 #[reflect(Component)]
 #[require(Transform, EmitterState)]
 pub struct Emitter {
-    /// What it sends out. Nothing is emitted (nor owed) before the asset is loaded.
+    /// What it sends out. Nothing is emitted (nor owed) before the asset is loaded; if it cannot be, the log and
+    /// [`NotEmitting`] say so.
     pub effect: Handle<WeatherEffect>,
     /// Particles per second, 0 or more.
     pub rate: f32,
@@ -78,6 +87,7 @@ pub enum Flow {
 
 impl Emitter {
     /// A hose of so many litres a minute through a nozzle of this diameter, metres: 15 l/min through 6 mm leave it at 8.8 m/s.
+    /// Its effect is [`WeatherEffect::HOSE`], or one of yours.
     pub fn hose(effect: Handle<WeatherEffect>, litres_per_minute: f32, nozzle: f32) -> Self {
         let speed = nozzle_speed(litres_per_minute, nozzle / 2.0);
         let shape = EmitterShape::Cone { radius: nozzle / 2.0 };
@@ -158,12 +168,16 @@ impl Plugin for EmitterPlugin {
         app.register_type::<Emitter>()
             .register_type::<EmissionSeed>()
             .register_type::<EmissionDetail>()
+            .register_type::<TrackSources>()
+            .register_type::<NotEmitting>()
             .init_resource::<EmissionSeed>()
             .init_resource::<EmissionDetail>()
             .init_resource::<NewParticles>()
             .add_systems(
                 WeatheringTick,
                 (emit_particles, spawn_particles).chain().in_set(WeatheringSystems::Emit),
-            );
+            )
+            // When all that a frame loads and spawns is there.
+            .add_systems(Last, silent::tell_silent);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::ExportError;
 use crate::clock::WeatheringClock;
-use crate::effect::WeatherEffect;
+use crate::effect::{ShippedEffect, WeatherEffect};
 use crate::material::PorousMaterial;
 use crate::overlay::{TILE_SIZE, Weatherable};
 use crate::scenario::check_weather;
@@ -59,7 +59,7 @@ impl Default for ExportOptions {
 /// The rain that is shipped.
 fn rain() -> WeatherEffect {
     // A test says that it can be read.
-    WeatherEffect::from_ron(include_bytes!("../../assets/effects/rain.effect.ron")).unwrap_or_default()
+    ShippedEffect::named("rain").and_then(|rain| rain.read().ok()).unwrap_or_default()
 }
 
 impl ExportOptions {

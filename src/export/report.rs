@@ -77,7 +77,6 @@ impl ExportReport {
         outcome: &Outcome,
         surfaces: Vec<BakedSurface>,
     ) -> Self {
-        let counts = outcome.particles;
         Self {
             scene,
             seed: options.seed,
@@ -85,14 +84,7 @@ impl ExportReport {
             wind: options.weather.wind.to_array(),
             ticks: outcome.ticks,
             seconds: f64::from(outcome.ticks) / f64::from(options.tick_hz),
-            particles: ParticleReport {
-                emitted: counts.emitted,
-                alive: counts.alive,
-                hit: counts.hit,
-                expired: counts.expired,
-                refused: counts.refused,
-                merged: counts.merged,
-            },
+            particles: outcome.particles.into(),
             water: outcome.water,
             surfaces,
         }

@@ -25,6 +25,7 @@ pub mod models;
 pub mod normals;
 mod played;
 mod porous;
+pub mod presets;
 mod ranges;
 mod standing;
 mod uniform;

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 use crate::wetting::evolve::Matter;
 
 /// How a surface takes up water and looks with it. On an entity with [`Weatherable`](crate::overlay::Weatherable);
-/// without it, the default is used. May be changed at any time.
+/// without it, the default is used. May be changed at any time. [`PorousMaterial::BRICK`] and others are
+/// [`presets`](super::presets).
 #[derive(Component, Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component)]
 #[serde(deny_unknown_fields, default)]
@@ -42,23 +43,9 @@ pub struct PorousMaterial {
 }
 
 impl Default for PorousMaterial {
-    /// Terracotta-like.
+    /// [`PorousMaterial::TERRACOTTA`].
     fn default() -> Self {
-        Self {
-            model: WettingModel::default(),
-            texture: TextureMeaning::DryLook,
-            brdf: BaseBrdf::Ggx,
-            t_fill: 0.4,
-            capacity_mm: 0.05,
-            visible_mm: 0.05,
-            sorptivity: 2.0,
-            pore_volume: 0.3,
-            retained_mm: 0.1,
-            rim_delay: 1.0,
-            efflorescence: 0.0,
-            tide_mark: 0.0,
-            wet_translucency: 0.0,
-        }
+        Self::TERRACOTTA
     }
 }
 
@@ -141,9 +128,15 @@ pub struct Pores {
     pub sqrt_k: bool,
 }
 
+impl Pores {
+    /// Those of fired clay: the default.
+    pub const TERRACOTTA: Self =
+        Self { alpha_poro: 0.5, s_p: 0.02, m: 0.35, k_s: 0.04, k_w: 0.9, sqrt_k: false };
+}
+
 impl Default for Pores {
     fn default() -> Self {
-        Self { alpha_poro: 0.5, s_p: 0.02, m: 0.35, k_s: 0.04, k_w: 0.9, sqrt_k: false }
+        Self::TERRACOTTA
     }
 }
 
@@ -157,9 +150,14 @@ pub struct Coated {
     pub n_solid: f32,
 }
 
+impl Coated {
+    /// A solid as dense as glass, rough everywhere: the default.
+    pub const ROUGH: Self = Self { porosity: 1.0, n_solid: 1.5 };
+}
+
 impl Default for Coated {
     fn default() -> Self {
-        Self { porosity: 1.0, n_solid: 1.5 }
+        Self::ROUGH
     }
 }
 
@@ -173,9 +171,15 @@ pub struct Grains {
     pub backscatter: f32,
 }
 
+impl Grains {
+    /// Nothing but grains: the default.
+    pub const SAND: Self =
+        Self { porosity: 1.0, backscatter: super::models::twomey::WATER_BACKSCATTER as f32 };
+}
+
 impl Default for Grains {
     fn default() -> Self {
-        Self { porosity: 1.0, backscatter: super::models::twomey::WATER_BACKSCATTER as f32 }
+        Self::SAND
     }
 }
 

@@ -22,7 +22,7 @@ pub mod slide;
 pub mod snow;
 mod surface;
 #[cfg(test)]
-mod test_world;
+pub(crate) mod test_world;
 mod texel;
 pub mod wash;
 

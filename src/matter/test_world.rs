@@ -1,4 +1,4 @@
-//! A sheet, its weather, and what lies on it, for the tests of this folder.
+//! A sheet, its weather, and what lies on it, for the tests of this folder and of brushes.
 
 use std::sync::Arc;
 
@@ -8,6 +8,7 @@ use super::SurfaceMatter;
 use super::advance::{MatterScratch, advance_matter};
 use super::settle::{self, Deposit, deposit};
 use crate::collision::MeshTriangles;
+use crate::emitter::Source;
 use crate::material::PorousMaterial;
 use crate::overlay::{Weatherable, Wrap};
 use crate::weather::{DryingClock, Weather};
@@ -15,10 +16,11 @@ use crate::wetting::{Drop, Now, RunScratch, SoakScratch, SurfaceWater, TexelGeom
 
 /// A square sheet in its weather.
 #[derive(Clone)]
-pub(super) struct Place {
-    pub(super) geometry: Arc<TexelGeometry>,
-    pub(super) material: PorousMaterial,
-    pub(super) weather: Weather,
+pub(crate) struct Place {
+    pub(crate) triangles: MeshTriangles,
+    pub(crate) geometry: Arc<TexelGeometry>,
+    pub(crate) material: PorousMaterial,
+    pub(crate) weather: Weather,
     drying: DryingClock,
     surface: Weatherable,
 }
@@ -43,6 +45,7 @@ impl Place {
         let geometry = TexelGeometry::new(&triangles, &Affine3A::IDENTITY, Vec3::Y, size, wrap);
         let material = PorousMaterial { capacity_mm: 0.0, retained_mm: 0.04, ..PorousMaterial::default() };
         let place = Self {
+            triangles,
             geometry: Arc::new(geometry),
             material,
             weather: Weather::default(),
@@ -53,7 +56,7 @@ impl Place {
     }
 
     /// A floor.
-    pub(super) fn flat(size: u32, texel: f32) -> Self {
+    pub(crate) fn flat(size: u32, texel: f32) -> Self {
         Self::slope(0.0, size, texel)
     }
 
@@ -69,7 +72,7 @@ impl Place {
         self
     }
 
-    pub(super) fn now(&self, tick: u32) -> Now<'_> {
+    pub(crate) fn now(&self, tick: u32) -> Now<'_> {
         Now::new(tick, Self::HZ, &self.drying, &self.geometry, None, &self.material)
     }
 
@@ -79,9 +82,9 @@ impl Place {
 }
 
 /// What lies on it.
-pub(super) struct Ground {
-    pub(super) water: SurfaceWater,
-    pub(super) matter: SurfaceMatter,
+pub(crate) struct Ground {
+    pub(crate) water: SurfaceWater,
+    pub(crate) matter: SurfaceMatter,
     pub(super) scratch: MatterScratch,
     run: RunScratch,
     soak: SoakScratch,
@@ -90,7 +93,7 @@ pub(super) struct Ground {
 
 impl Ground {
     /// Nothing has ever come.
-    pub(super) fn dry(place: &Place) -> Self {
+    pub(crate) fn dry(place: &Place) -> Self {
         Self {
             water: SurfaceWater::new(&place.surface, place.geometry.mean_mm2()),
             matter: SurfaceMatter::default(),
@@ -129,7 +132,8 @@ impl Ground {
             let along =
                 |step: u32| ((u64::from(self.drops.wrapping_mul(step)) * u64::from(across)) >> 32) as i32;
             let center = [along(3_242_174_889), along(2_447_445_414)];
-            let drop = Drop { center, radius: [384; 2], water_nl: 4189, speed_mm: 6500 };
+            let drop =
+                Drop { center, radius: [384; 2], water_nl: 4189, speed_mm: 6500, source: Source::UNKNOWN };
             let matter = self.matter.awake(place.geometry.size());
             soak(&mut self.water, &now, &[drop], &mut self.soak, matter, &place.weather);
         }
@@ -162,7 +166,7 @@ impl Ground {
 }
 
 /// What came is on the surface, or the ledger says where it went.
-pub(super) fn assert_balanced(matter: &SurfaceMatter) {
+pub(crate) fn assert_balanced(matter: &SurfaceMatter) {
     let (stock, ledger) = (matter.stock(), matter.ledger());
     let soil = ledger.received_dust + ledger.received_mud;
     let gone = ledger.washed_off + ledger.wiped;

@@ -4,8 +4,8 @@ use bevy::prelude::*;
 
 use super::frames::{Frames, SurfaceFrames, TexelFrame};
 use super::kernel::{
-    axis_offset, blend_over, depth_part, dot_axes, facing_part, falloff, framed, lay_stamp, slope_color,
-    slope_of, stamp_alpha, stamp_slope, turned, unpack_axis,
+    axes_part, axis_offset, blend_over, depth_part, dot_axes, facing_part, falloff, framed, lay_stamp,
+    slope_color, slope_of, stamp_alpha, stamp_slope, turned, unpack_axis,
 };
 use super::{MapSize, Splat, SplatQueue, StampAtlas, TILE_SIZE, Weatherable, Wrap};
 use crate::schedule::{WeatheringSystems, WeatheringTick};
@@ -98,8 +98,7 @@ impl CpuMaps {
             };
             over(diffuse, paint);
             over(specular, gloss);
-            let along = |row: [i32; 2]| (place.offset[0] * row[0] + place.offset[1] * row[1]) / place.unit;
-            let slopes = place.along.map(|row| slope_color(splat.bump, along(row)));
+            let slopes = place.along.map(|row| slope_color(splat.bump, turned(row, place.offset)));
             over(normal, [slopes[0], slopes[1], 255, splat.bump_opacity]);
             return;
         }
@@ -124,7 +123,7 @@ impl CpuMaps {
         over(specular, color, tint(gloss), part(gloss[3]));
         let [r, g, _, coverage] = unpack(mix4(a.normal, b.normal, c.normal, d.normal, wx, wy));
         let slopes = [slope_of(r, coverage), slope_of(g, coverage)];
-        let [u, v] = place.along.map(|row| stamp_slope(slopes, row, place.unit, splat.bump, coverage));
+        let [u, v] = place.along.map(|row| stamp_slope(slopes, row, splat.bump, coverage));
         over(normal, [u, v, coverage, coverage], [255; 3], part(splat.bump_opacity));
     }
 }
@@ -133,9 +132,8 @@ impl CpuMaps {
 struct Place {
     /// Along the stamp's own axes, 1/256 radius.
     offset: [i32; 2],
-    /// For u and v: their parts along the stamp's axes, in `unit`s.
+    /// For u and v: their parts along the stamp's axes, 1024 for 1.
     along: [[i32; 2]; 2],
-    unit: i32,
     /// How much of the stamp reaches it, 0..=256.
     part: u32,
 }
@@ -143,13 +141,13 @@ struct Place {
 impl Place {
     fn on_map(splat: &Splat, offset: [i32; 2]) -> Self {
         if splat.stamp == 0 {
-            return Self { offset, along: [[1, 0], [0, 1]], unit: 1, part: 256 };
+            return Self { offset, along: [[1024, 0], [0, 1024]], part: 256 };
         }
         let [[ss, st, _], [ts, tt, _]] = [splat.row_s, splat.row_t];
         // A corner of a turned stamp that hangs out of its box is cut off.
         let part = if on_stamp(offset) { 256 } else { 0 };
         let offset = [turned([ss, st], offset), turned([ts, tt], offset)];
-        Self { offset, along: [[ss, ts], [st, tt]], unit: 1024, part }
+        Self { offset, along: [[ss, ts], [st, tt]], part }
     }
 
     fn in_space(splat: &Splat, frame: &TexelFrame) -> Option<Self> {
@@ -160,8 +158,8 @@ impl Place {
         let facing = facing_part(dot_axes(unpack_axis(frame.normal), unpack_axis(splat.axis_n)));
         let part = (depth_part(n) * facing) >> 8;
         let axes = [splat.axis_s, splat.axis_t].map(unpack_axis);
-        let along = frame.along().map(|along| axes.map(|axis| dot_axes(along, axis)));
-        (part > 0 && on_stamp([s, t])).then_some(Self { offset: [s, t], along, unit: 127 * 127, part })
+        let along = frame.along().map(|along| axes.map(|axis| axes_part(dot_axes(along, axis))));
+        (part > 0 && on_stamp([s, t])).then_some(Self { offset: [s, t], along, part })
     }
 }
 

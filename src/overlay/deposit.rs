@@ -11,7 +11,7 @@ use crate::clock::WeatheringClock;
 use crate::collision::{DeformingCollider, Impact, Impacts, SurfaceCollider};
 use crate::effect::drops::splashes;
 use crate::effect::{Carries, EffectRow, EffectTable, RefreshEffects, WeatherEffect};
-use crate::emitter::NewParticles;
+use crate::emitter::{NewParticles, Source};
 use crate::matter::{Deposit, MatterKind, MatterQueue, SurfaceMatter};
 use crate::particle::{Lifespan, Particle, ParticleConfig, Particles};
 use crate::schedule::{WeatheringSystems, WeatheringTick};
@@ -187,6 +187,8 @@ pub fn deposit_splats(
         let Some(effect) = &row.effect else { continue };
         (totals.impacts, totals.last_tick) = (totals.impacts + 1, clock.tick());
         let (water_nl, solid_nl) = effect.carries.parts_nl(impact.volume_nl);
+        let source = new.source_of(impact.sequence);
+        new.attribute_to(source);
         let water_nl = water_nl - throw_up(impact, row, effect, water_nl, &clock, room, &mut new);
         totals.water_nl += u64::from(water_nl);
         let Some(size) = size else {
@@ -215,9 +217,10 @@ pub fn deposit_splats(
         {
             let speed_mm = (impact.velocity.length() * 1000.0) as u32;
             let Splat { center, radius, water_nl, .. } = splat;
-            drops.0.push(Drop { center, radius, water_nl, speed_mm });
+            drops.0.push(Drop { center, radius, water_nl, speed_mm, source });
         }
     }
+    new.attribute_to(Source::UNKNOWN);
 }
 
 /// Throws a part of an impact's water up again, as two drops that are born in the next tick; returns how much, nanolitres.

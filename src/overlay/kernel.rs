@@ -64,9 +64,11 @@ pub fn unwrapped(axis: Axis, texel: i32) -> i32 {
     if axis.clamped {
         return texel;
     }
+    // At most one map before the texel, and less than one behind it: a remainder without a division.
     let first = (axis.center - axis.radius) >> 8;
-    // Twice the size makes the number positive: the stamp begins at most one map away.
-    first + (texel - first + 2 * axis.size) % axis.size
+    let onward = texel - first;
+    let onward = if onward < 0 { onward + axis.size } else { onward };
+    first + if onward >= axis.size { onward - axis.size } else { onward }
 }
 
 /// Parts of a stamp that lie before the texel and before its end, along one axis. On a clamped axis the outermost
@@ -91,11 +93,13 @@ pub fn share(volume: u32, coverage: [u32; 2]) -> u32 {
     scale_floor(volume, coverage[1]) - scale_floor(volume, coverage[0])
 }
 
-/// Distance of the texel's middle from the stamp's, along one axis; 256 is the radius.
+/// Distance of the texel's middle from the stamp's, along one axis, to the nearest; 256 is the radius. Within 1/2 of that for radii
+/// of up to 1024 texels.
 pub fn axis_offset(axis: Axis, texel: i32) -> i32 {
     let from_center = unwrapped(axis, texel) * SUBTEXELS + SUBTEXELS / 2 - axis.center;
-    // Clamped before scaling: beyond the radius it does not matter by how much.
-    from_center.clamp(-2 * axis.radius, 2 * axis.radius) * 256 / axis.radius
+    // Clamped before scaling: beyond the radius it does not matter by how much. The one division is the same for all texels.
+    let near = from_center.clamp(-2 * axis.radius, 2 * axis.radius);
+    (near * ((1 << 29) / axis.radius) + (1 << 20)) >> 21
 }
 
 /// The dome `(1 - d²)²` at an offset in 1/256 radius: 0..=4096.
@@ -165,11 +169,16 @@ pub fn lay_stamp(channel: u32, tint: u32, opacity: u32, weight: u32, under: u32)
     (channel * tint * opacity + under * (65_025 - weight) + 32_512) / 65_025
 }
 
+/// From [`dot_axes`] to 1/1024: 16,129 is 1023.
+pub fn axes_part(dot: i32) -> i32 {
+    (dot * 65) >> 10
+}
+
 /// A slope of a stamp as a premultiplied colour, from its premultiplied slopes along its own axes and how these lie on the
-/// map, each of `unit` for 1; scaled by `bump` of 127.
-pub fn stamp_slope(slopes: [i32; 2], along: [i32; 2], unit: i32, bump: i32, coverage: u32) -> u32 {
+/// map, 1024 for 1; scaled by `bump` of 127.
+pub fn stamp_slope(slopes: [i32; 2], along: [i32; 2], bump: i32, coverage: u32) -> u32 {
     let flat = (128 * coverage + 127) / 255;
-    let slope = (slopes[0] * along[0] + slopes[1] * along[1]) / unit * bump / 127;
+    let slope = turned(along, slopes) * bump / 127;
     (flat as i32 + slope).clamp(0, coverage as i32) as u32
 }
 
@@ -295,9 +304,9 @@ mod tests {
         assert_eq!((turned([1024, 0], [77, -5]), turned([0, -1024], [77, -5])), (77, 5));
         // Flat stays flat, and a slope along the stamp's first axis is one along the map's, if they are the same.
         assert_eq!((slope_of(100, 200), slope_of(110, 200)), (0, 10));
-        assert_eq!(stamp_slope([0, 0], [1024, 0], 1024, 127, 200), 100);
-        assert_eq!(stamp_slope([10, 3], [1024, 0], 1024, 127, 200), 110);
-        assert_eq!(stamp_slope([10, 3], [0, 1024], 1024, -127, 200), 97);
+        assert_eq!(stamp_slope([0, 0], [1024, 0], 127, 200), 100);
+        assert_eq!(stamp_slope([10, 3], [1024, 0], 127, 200), 110);
+        assert_eq!(stamp_slope([10, 3], [0, 1024], -127, 200), 97);
     }
 
     #[test]

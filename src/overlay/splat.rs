@@ -6,8 +6,8 @@ use bytemuck::{Pod, Zeroable};
 use super::Wrap;
 use super::kernel::{Axis, SUBTEXELS};
 
-/// A stamp on the maps of one surface. A row of the GPU's splat buffer: `Splat` in `shaders/splat.wgsl` has
-/// the same fields in the same order.
+/// A stamp on the maps of one surface. The GPU reads it as seven texels of four words: `splat_at` in `shaders/splat.wgsl` takes
+/// them apart in the same order.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub struct Splat {
@@ -15,10 +15,6 @@ pub struct Splat {
     pub center: [i32; 2],
     /// Half its width and height, in 1/256 texel.
     pub radius: [i32; 2],
-    /// Water it leaves; nanolitres.
-    pub water_nl: u32,
-    /// Tick of the impact, 1 or more.
-    pub tick: u32,
     /// Colour (red in the lowest byte) and in the highest byte the opacity.
     pub diffuse: u32,
     /// Reflectance, smoothness, unused, opacity; lowest byte first.
@@ -32,21 +28,25 @@ pub struct Splat {
     /// 0: it lies on the map, by `center` and `radius`. 1: in the space of the mesh, by what follows; then it crosses from one
     /// island of the map to another.
     pub in_space: u32,
+    /// Water it leaves; nanolitres.
+    pub water_nl: u32,
+    /// Tick of the impact, 1 or more.
+    pub tick: u32,
     /// From the way from its middle to the first axis of the stamp. On the map two numbers, 1/1024, from an offset in radii; in
     /// space three, see [`framed`](super::kernel::framed).
     pub row_s: [i32; 3],
-    /// To the second axis.
-    pub row_t: [i32; 3],
-    /// In space: to the axis out of the surface.
-    pub row_n: [i32; 3],
-    /// In space: its middle, in steps of the [`SurfaceFrames`](super::SurfaceFrames).
-    pub origin: [i32; 3],
     /// In space: twice its radius, in steps.
     pub reach: i32,
+    /// To the second axis.
+    pub row_t: [i32; 3],
     /// In space: the axes, three signed bytes each, 127 for 1.
     pub axis_s: u32,
+    /// In space: to the axis out of the surface.
+    pub row_n: [i32; 3],
     /// The second.
     pub axis_t: u32,
+    /// In space: its middle, in steps of the [`SurfaceFrames`](super::SurfaceFrames).
+    pub origin: [i32; 3],
     /// The third, out of the front of the surface.
     pub axis_n: u32,
 }
@@ -90,13 +90,8 @@ impl Splat {
 
     /// The texels the stamp touches along an axis, each once, brought into the map.
     pub fn texels(&self, index: usize, size: u32, wrap: [Wrap; 2]) -> impl Iterator<Item = u32> + use<> {
-        let side = size as i32;
         let (first, last) = self.span(index);
-        let (first, last) = match wrap[index] {
-            Wrap::Repeat => (first, last.min(first + side - 1)),
-            Wrap::Clamp => (first.clamp(0, side - 1), last.clamp(0, side - 1)),
-        };
-        (first..=last).map(move |texel| texel.rem_euclid(side) as u32)
+        wrap[index].cells(first, last, size)
     }
 
     /// First and last texel the stamp touches along an axis, before wrapping or clamping.
@@ -111,9 +106,38 @@ pub(crate) fn pack_unorm(values: [f32; 4]) -> u32 {
     u32::from_le_bytes(values.map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8))
 }
 
+impl Wrap {
+    /// The columns or rows of a map with so many along that axis, texels or tiles, from `first` to `last`; those beyond an edge
+    /// are brought into the map. None comes twice: what goes all the way round ends before where it began.
+    pub(crate) fn cells(self, first: i32, last: i32, count: u32) -> impl Iterator<Item = u32> + Clone {
+        let count = count as i32;
+        let (first, last) = match self {
+            Self::Repeat => (first, last.min(first.saturating_add(count - 1))),
+            Self::Clamp => (first.clamp(0, count - 1), last.clamp(0, count - 1)),
+        };
+        (first..=last).map(move |cell| cell.rem_euclid(count) as u32)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_texel_holds_what_the_shader_reads_from_it() {
+        use std::mem::offset_of;
+        let texels = [
+            offset_of!(Splat, center),
+            offset_of!(Splat, diffuse),
+            offset_of!(Splat, stamp),
+            offset_of!(Splat, row_s),
+            offset_of!(Splat, row_t),
+            offset_of!(Splat, row_n),
+            offset_of!(Splat, origin),
+        ];
+        assert_eq!(texels, [0, 1, 2, 3, 4, 5, 6].map(|texel| texel * 16));
+        assert_eq!(size_of::<Splat>(), 7 * 16);
+    }
 
     #[test]
     fn uvs_in_any_tile_are_brought_into_the_map() {

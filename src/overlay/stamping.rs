@@ -11,6 +11,7 @@ use super::{Splat, StampAtlas, Wrap};
 use crate::collision::Impact;
 use crate::effect::drops::{drop_mm3, spread_mm};
 use crate::effect::{EffectRow, StampTurn, WeatherEffect};
+use crate::material::film::ripples::pcg;
 
 /// A drop of diameter d spreads to `d We^1/4`; We grows with d, and d with the cube root of the volume.
 const SPREAD_BY_VOLUME: f32 = 5.0 / 12.0;
@@ -87,7 +88,7 @@ pub(super) fn splat_from_impact(
         ..Zeroable::zeroed()
     };
     if let (first, count @ 1..) = row.stamps {
-        let variant = hash(impact.sequence.0 ^ 0x5bd1_e995) % count;
+        let variant = pcg(impact.sequence.0 ^ 0x5bd1_e995) % count;
         splat.stamp = StampAtlas::number(first, variant, splat.radius, stretch);
     }
     // The map lies on the front.
@@ -156,21 +157,14 @@ fn least_stretch(world_from_mesh: Mat3A) -> f32 {
     if least.is_finite() && least > 0.0 { least } else { world_from_mesh.determinant().abs().cbrt() }
 }
 
-/// The output permutation of PCG (O'Neill 2014) as a hash.
-fn hash(number: u32) -> u32 {
-    let state = number.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
-    (word >> 22) ^ word
-}
-
 /// An even number in [0, 1).
 pub(super) fn unit_hash(number: u32) -> f32 {
-    (hash(number) >> 8) as f32 / (1u32 << 24) as f32
+    (pcg(number) >> 8) as f32 / (1u32 << 24) as f32
 }
 
 /// An even number in [-1, 1).
 fn signed_hash(number: u32) -> f32 {
-    hash(number) as f32 / (1u32 << 31) as f32 - 1.0
+    pcg(number) as f32 / (1u32 << 31) as f32 - 1.0
 }
 
 #[cfg(test)]

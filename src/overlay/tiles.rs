@@ -34,22 +34,10 @@ pub struct TileBins {
 }
 
 impl TileBins {
-    /// Appends the touched tiles of one surface to `headers`, and their splats to `list`, as numbers from
-    /// `first_splat` on. `frames`: where the texels lie; without them, splats in space touch nothing. Tiles come in ascending order, splats within a tile in theirs.
-    pub fn bin(
-        &mut self,
-        splats: &[Splat],
-        size: u32,
-        wrap: [Wrap; 2],
-        frames: Option<&SurfaceFrames>,
-        first_splat: u32,
-        headers: &mut Vec<TileHeader>,
-        list: &mut Vec<u32>,
-    ) {
-        self.bin_within(usize::MAX, splats, size, wrap, frames, first_splat, headers, list);
-    }
-
-    /// The same of the first splats only: one, and as many more as begin within so many [bytes](Self::bytes). Returns how many.
+    /// Appends the tiles of one surface that its first splats touch to `headers`, and those splats to `list`, as numbers from
+    /// `first_splat` on: one splat, and as many more as begin within so many [bytes](Self::bytes). Returns how many. `frames`:
+    /// where the texels lie; without them, splats in space touch nothing. Tiles come in ascending order, splats within a tile
+    /// in theirs.
     pub fn bin_within(
         &mut self,
         bytes: usize,
@@ -120,14 +108,7 @@ impl TileBins {
 fn tiles_on_axis(splat: &Splat, axis: usize, side: usize, wrap: Wrap) -> impl Iterator<Item = usize> + Clone {
     let tile = TILE_SIZE as i32;
     let (first, last) = splat.span(axis);
-    let (first, last) = (first.div_euclid(tile), last.div_euclid(tile));
-    let side = side as i32;
-    let (first, last) = match wrap {
-        // A stamp that goes all the way round ends in the tile it began in.
-        Wrap::Repeat => (first, last.min(first + side - 1)),
-        Wrap::Clamp => (first.clamp(0, side - 1), last.clamp(0, side - 1)),
-    };
-    (first..=last).map(move |tile| tile.rem_euclid(side) as usize)
+    wrap.cells(first.div_euclid(tile), last.div_euclid(tile), side as u32).map(|tile| tile as usize)
 }
 
 #[cfg(test)]
@@ -144,7 +125,7 @@ mod tests {
         for _ in 0..2 {
             headers.clear();
             list.clear();
-            bins.bin(splats, size, wrap, None, 0, &mut headers, &mut list);
+            bins.bin_within(usize::MAX, splats, size, wrap, None, 0, &mut headers, &mut list);
         }
         assert!(bins.counts.iter().all(|&count| count == 0), "bins are clean between batches");
         headers.iter().map(|h| ((h.x, h.y), list[h.start as usize..][..h.count as usize].to_vec())).collect()

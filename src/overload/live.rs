@@ -43,8 +43,8 @@ impl LiveBudget {
     fn longest_delta(&self, clock: &WeatheringClock, tick_ms: f32, speed: f64) -> Duration {
         let ticks = f64::from(ticks_in_a_frame(self.frame_ms, tick_ms));
         let seconds = ticks / f64::from(clock.hz()) / speed.max(1e-3);
-        // Zero is not allowed, and no number gives the least.
-        Duration::from_secs_f64(seconds.min(f64::from(self.longest_ms) / 1000.0).clamp(1e-4, 3600.0))
+        // Zero is not allowed, and no number gives the least: a tick of any rate, a hundred times as fast, is more.
+        Duration::from_secs_f64(seconds.min(f64::from(self.longest_ms) / 1000.0).clamp(1e-6, 3600.0))
     }
 }
 
@@ -157,6 +157,10 @@ mod tests {
         assert!((ticks(0.1, 1.0) - 15.0).abs() < 1e-3, "no more than Bevy does");
         // Ten times as fast, two ticks are a tenth of the real time.
         assert!((ticks(12.0, 10.0) - 0.2).abs() < 1e-3);
+        // A tick that takes ten seconds: one a frame, also where they are short and time is fast.
+        let fast = WeatheringClock::new(1000);
+        let longest = budget.longest_delta(&fast, 10_000.0, 100.0).as_secs_f64();
+        assert!((longest * 100.0 * 1000.0 - 1.0).abs() < 1e-3, "{longest}");
         assert!((budget.tick_ms(&clock) - 11.667).abs() < 0.01);
         let odd = LiveBudget { load: 0.0, frame_ms: f32::NAN, longest_ms: 0.0 };
         assert!(odd.longest_delta(&clock, f32::NAN, f64::NAN) > Duration::ZERO && odd.tick_ms(&clock) > 0.0);

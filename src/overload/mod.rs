@@ -9,11 +9,15 @@
 //!
 //! The first three depend on nothing but what is simulated. The last looks at the wall clock, so no two runs need be alike: it is
 //! no part of [`WeatheringPlugins`](crate::WeatheringPlugins), and no replay has it. Add [`LiveBudgetPlugin`] to what is watched.
+//! [`StageTimesPlugin`] tells what in a tick takes the time.
 
 mod diagnostics;
 pub mod governor;
 mod live;
+mod stages;
 
 pub use diagnostics::OverloadDiagnosticsPlugin;
 pub use governor::{Governor, TickReading};
 pub use live::{LiveBudget, LiveBudgetPlugin, LiveLoad};
+pub(crate) use stages::end_stage;
+pub use stages::{STAGES, StageMark, StageMeans, StageTimes, StageTimesPlugin};

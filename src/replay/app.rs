@@ -1,26 +1,19 @@
 //! The app of a replay, with and without a renderer.
 
-use bevy::app::{
-    PanicHandlerPlugin, TaskPoolOptions, TaskPoolPlugin, TaskPoolThreadAssignmentPolicy,
-    TerminalCtrlCHandlerPlugin,
-};
+use bevy::app::{TaskPoolOptions, TaskPoolPlugin, TaskPoolThreadAssignmentPolicy};
 use bevy::asset::AssetPlugin;
 use bevy::gltf::GltfPlugin;
 use bevy::image::{CompressedImageFormatSupport, CompressedImageFormats, ImagePlugin};
-use bevy::log::LogPlugin;
 use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
-use bevy::render::RenderPlugin;
-use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
 use bevy::render::render_resource::PollType;
 use bevy::render::renderer::RenderDevice;
 use bevy::tasks::block_on;
-use bevy::window::ExitCondition;
-use bevy::winit::WinitPlugin;
 use bevy::world_serialization::WorldSerializationPlugin;
 
 use super::{ReplayError, ReplayOptions};
 use crate::WeatheringPlugins;
+use crate::offscreen;
 use crate::overlay::{CpuOverlayPlugin, GpuOverlayPlugin};
 use crate::scenario::ScenarioPlugin;
 
@@ -61,25 +54,10 @@ pub(super) fn build(options: &ReplayOptions, scenario: ScenarioPlugin) -> App {
     let tasks = task_pools(options.threads);
     let assets = AssetPlugin { file_path: options.scenario.tree.to_string_lossy().into_owned(), ..default() };
     if options.render {
-        let no_window =
-            WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
         app = App::new();
-        app.add_plugins(
-            DefaultPlugins
-                .set(tasks)
-                .set(assets)
-                .set(no_window)
-                .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
-                // Driven by hand, on this thread.
-                .disable::<WinitPlugin>()
-                .disable::<PipelinedRenderingPlugin>()
-                // The program's, not a library's, to set up.
-                .disable::<LogPlugin>()
-                .disable::<PanicHandlerPlugin>()
-                .disable::<TerminalCtrlCHandlerPlugin>(),
-        )
-        .add_plugins(WeatheringPlugins)
-        .insert_resource(options.splats);
+        app.add_plugins(offscreen::plugins().set(tasks).set(assets))
+            .add_plugins(WeatheringPlugins)
+            .insert_resource(options.splats);
     } else {
         app = headless(tasks, assets);
     }

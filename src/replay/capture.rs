@@ -3,14 +3,13 @@
 use std::path::Path;
 use std::time::Instant;
 
-use bevy::asset::RenderAssetUsages;
 use bevy::camera::RenderTarget;
 use bevy::prelude::*;
-use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat, TextureUsages};
 use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
 use image::{ImageError, ImageFormat};
 
 use super::{ReplayError, Run, give_up_after};
+use crate::offscreen;
 use crate::picture::{PictureError, write_picture};
 
 /// Pictures that have come back from the GPU.
@@ -23,14 +22,7 @@ struct Pictures {
 
 /// Makes every camera draw into an image instead of a window.
 pub(super) fn add_target(world: &mut World, size: UVec2) -> Handle<Image> {
-    let mut image = Image::new_uninit(
-        Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
-        TextureDimension::D2,
-        TextureFormat::Rgba8UnormSrgb,
-        RenderAssetUsages::RENDER_WORLD,
-    );
-    image.texture_descriptor.usage |= TextureUsages::RENDER_ATTACHMENT;
-    let target = world.resource_mut::<Assets<Image>>().add(image);
+    let target = offscreen::target(&mut world.resource_mut::<Assets<Image>>(), size);
     let mut cameras = world.query_filtered::<Entity, With<Camera>>();
     for camera in cameras.iter(world).collect::<Vec<_>>() {
         world.entity_mut(camera).insert(RenderTarget::from(target.clone()));

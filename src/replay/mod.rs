@@ -24,7 +24,6 @@ mod plots;
 mod report;
 mod series;
 mod sheet;
-mod stages;
 mod table;
 mod video;
 

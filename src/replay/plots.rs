@@ -4,9 +4,9 @@ use std::path::Path;
 
 use super::plot::{Line, MAX_LINES, Plot};
 use super::series::SeriesTables;
-use super::stages::STAGES;
 use super::table::Table;
 use super::{ReplayError, write_atomic};
+use crate::overload::STAGES;
 
 /// The folder of the plots, beside the report.
 pub(super) const PLOTS_FOLDER: &str = "plots";

@@ -62,6 +62,13 @@ pub struct ParticleReport {
     pub merged: u64,
 }
 
+impl From<ParticleCounts> for ParticleReport {
+    fn from(counts: ParticleCounts) -> Self {
+        let ParticleCounts { emitted, alive, hit, expired, refused, merged } = counts;
+        Self { emitted, alive, hit, expired, refused, merged }
+    }
+}
+
 /// One surface.
 #[derive(Serialize, Debug, Clone, PartialEq)]
 pub struct SurfaceReport {
@@ -228,14 +235,7 @@ pub(super) fn report(
         seed: world.resource::<EmissionSeed>().0,
         ticks: clock.tick(),
         seconds: clock.seconds(),
-        particles: ParticleReport {
-            emitted: counts.emitted,
-            alive: counts.alive,
-            hit: counts.hit,
-            expired: counts.expired,
-            refused: counts.refused,
-            merged: counts.merged,
-        },
+        particles: counts.into(),
         water,
         work: WorkReport {
             drops: stats.drops(),

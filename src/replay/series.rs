@@ -11,13 +11,13 @@ use std::path::Path;
 use bevy::prelude::*;
 
 use super::report::{SurfaceAccounts, WaterReport, water_report};
-use super::stages::{STAGES, StageTimes, end_stage, measure_stages};
 use super::table::Table;
 use super::{ReplayError, ReplayOptions, Run, write_atomic};
 use crate::clock::WeatheringClock;
 use crate::material::PorousMaterial;
 use crate::matter::SurfaceMatter;
 use crate::overlay::{MapLoss, SurfaceTotals};
+use crate::overload::{STAGES, StageMark, StageTimes, StageTimesPlugin, end_stage};
 use crate::particle::ParticleCounts;
 use crate::scenario::{Scenario, ScenarioSurface};
 use crate::schedule::WeatheringTick;
@@ -81,6 +81,8 @@ struct Series {
     every: u32,
     rows: Table,
     timings: Table,
+    /// When the last row of timings was taken.
+    mark: StageMark,
 }
 
 /// The numbers of a whole run.
@@ -94,12 +96,15 @@ impl Run<'_> {
     pub(super) fn begin_series(&mut self, every: u32) {
         let timings = TIMINGS.into_iter().map(String::from);
         let stages = STAGES.into_iter().map(|stage| format!("{stage}_ms"));
+        // Not by `add_plugins`: the app is finished.
+        StageTimesPlugin.build(&mut self.app);
+        let mark = self.app.world().resource::<StageTimes>().mark();
         self.app.insert_resource(Series {
             every,
             rows: Table::new(columns(&self.options.scenario.scenario)),
             timings: Table::new(timings.chain(stages).collect()),
+            mark,
         });
-        measure_stages(&mut self.app);
         // What it takes to look at the surfaces belongs to no stage.
         self.app.add_systems(WeatheringTick, take_due_row.after(end_stage::<6>));
         take_row(self.app.world_mut());
@@ -183,8 +188,9 @@ fn take_row(world: &mut World) {
     let clock = *world.resource::<WeatheringClock>();
     let time = [f64::from(clock.tick()), clock.seconds()];
     let row = row(world, time);
-    let means = world.resource_mut::<StageTimes>().take();
+    let times = *world.resource::<StageTimes>();
     let mut series = world.resource_mut::<Series>();
+    let means = times.take_since(&mut series.mark);
     series.rows.push(row);
     if let Some(means) = means {
         let counted = [f64::from(means.ticks), means.outside_ms];

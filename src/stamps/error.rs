@@ -1,7 +1,8 @@
 //! What can be wrong with stamps.
 
 use std::fmt::{self, Display, Formatter};
-use std::path::PathBuf;
+
+use crate::picture::PictureError;
 
 /// Why stamps could not be made, taken from images or written.
 #[derive(thiserror::Error, Debug)]
@@ -74,22 +75,9 @@ pub enum StampError {
         /// Texels along each side of that.
         other_size: u32,
     },
-    /// A file could not be written.
-    #[error("{}: {source}", .path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// A file could not be encoded.
-    #[error("{}: {source}", .path.display())]
-    Image {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: image::ImageError,
-    },
+    /// A file could not be written or encoded.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
 }
 
 /// One of the three images of a stamp.

@@ -8,13 +8,14 @@ use image::{ExtendedColorType, ImageEncoder};
 
 use super::{RgbaStrip, StampError, StampKind, StampMap, StampStrips};
 use crate::output::write_atomic;
+use crate::picture::PictureError;
 
 /// Writes `<kind>_diffuse.png`, `<kind>_specular.png` and `<kind>_normal.png` into a folder, which is made if it is
 /// missing. They hold numbers, not light: load them as linear. Each is there whole or not at all, and none is
 /// written unless all can be encoded.
 ///
 /// # Errors
-/// [`StampError::Count`], [`StampError::File`], [`StampError::Image`].
+/// [`StampError::Count`], [`StampError::Picture`].
 pub fn write_stamps(
     folder: &Path,
     kind: StampKind,
@@ -31,10 +32,10 @@ pub fn write_stamps(
     for (path, (map, strip)) in paths.iter().zip(maps) {
         // The encoder would panic.
         strip.check_count(map)?;
-        files.push(png(strip).map_err(|source| StampError::Image { path: path.clone(), source })?);
+        files.push(png(strip).map_err(|source| PictureError::Image { path: path.clone(), source })?);
     }
     for (path, bytes) in paths.iter().zip(&files) {
-        write_atomic(path, bytes).map_err(|source| StampError::File { path: path.clone(), source })?;
+        write_atomic(path, bytes).map_err(|source| PictureError::File { path: path.clone(), source })?;
     }
     Ok(paths)
 }

@@ -8,7 +8,7 @@ use super::{Dripping, SurfaceWater, TexelGeometry, WetGeometry};
 use crate::clock::WeatheringClock;
 use crate::collision::{DeformingCollider, MeshTriangles, SurfaceCollider};
 use crate::effect::{Carries, EffectIndex, ParticleLook, Sprite, WeatherEffect};
-use crate::emitter::NewParticles;
+use crate::emitter::{NewParticles, Source};
 use crate::matter::FallingSnow;
 use crate::particle::{Lifespan, Particle};
 
@@ -101,6 +101,7 @@ pub(super) fn shed_drips(
         };
         let stance = Stance::new(&geometry.0, collider.0.triangles(), transform, deforming);
         let mut shed = |site: DripSite, texel: u32, volume_nl: u32, effect: EffectIndex| {
+            new.attribute_to(water.origins.source(texel));
             let (position, velocity) = (stance.start_of(site, texel), stance.velocity(texel, &clock));
             let lifespan = Lifespan { ticks_left, born_at: 0 };
             new.push(|sequence| Particle {
@@ -123,6 +124,7 @@ pub(super) fn shed_drips(
             }
         }
     }
+    new.attribute_to(Source::UNKNOWN);
 }
 
 type Shedding = (

@@ -15,12 +15,14 @@
 //! On meshes that are posed, water runs by the slopes of their pose (`posed`) and drips from where they are; areas and exposure
 //! are those of the mesh at rest.
 //!
-//! What it does to dust, mud and snow is told in [`matter`](crate::matter).
+//! What it does to dust, mud and snow is told in [`matter`](crate::matter). Which emitter it came from is kept for those who
+//! ask ([`Origin`]).
 //!
 //! Not here: water under the surface of a pool that flows; evaporation that cools.
 
 mod adjacency;
 mod arrivals;
+mod by_hand;
 mod drip;
 pub mod evolve;
 mod exposure;
@@ -32,12 +34,14 @@ mod gutters;
 mod links;
 pub mod look;
 mod marks;
+mod origin;
 mod ownership;
 mod points;
 mod posed;
 mod prepare;
 mod put_back;
 pub(crate) mod query;
+mod ready;
 mod rim;
 mod run_off;
 mod slopes;
@@ -60,10 +64,12 @@ pub use drip::{Drip, DripEffect, DripSite, drip_effect, snow_fall_effect};
 pub use exposure::{Exposure, ExposureProgress};
 pub use geometry::{Link, Side, TexelGeometry};
 pub use marks::Marks;
+pub use origin::Origin;
 pub use points::{SurfacePoint, surface_points};
 pub use prepare::WetGeometry;
 pub(crate) use prepare::{ExchangeMatter, put_matter};
 pub use query::{BecameWet, Dried, SurfaceWetness, WatchWetness, Wetness, WetnessQuery};
+pub use ready::{Refusal, SurfaceReady, SurfaceRefused};
 pub use soak::Drop;
 pub use surface::{Ledger, Stock, SurfaceWater};
 pub use texel::{Scale, TexelWater, Units};
@@ -97,11 +103,17 @@ impl Plugin for WettingPlugin {
         app.register_required_components::<Weatherable, DropQueue>()
             .register_required_components::<Weatherable, Dripping>()
             .register_type::<WatchWetness>()
+            .register_type::<Origin>()
             .init_resource::<WettingStats>()
             .init_resource::<DripEffect>()
             .init_resource::<ExposureProgress>()
             .add_message::<BecameWet>()
             .add_message::<Dried>()
+            .add_message::<SurfaceReady>()
+            .add_message::<SurfaceRefused>()
+            .add_observer(ready::tell_ready)
+            .add_observer(ready::tell_refused_mesh)
+            .add_observer(ready::tell_refused_maps)
             .add_observer(prepare::release_surface)
             .add_observer(prepare::release_maps)
             .add_systems(
@@ -111,6 +123,7 @@ impl Plugin for WettingPlugin {
                     prepare::measure_surfaces,
                     posed::measure_posed_slopes,
                     exposure::bake_exposure,
+                    origin::ask_for_origins,
                 )
                     .chain()
                     .in_set(MeasureSurfaces)

@@ -325,6 +325,7 @@ fn carry(water: &mut SurfaceWater, now: &Now, tile: u32, step: &Move, matter: Op
         // It may have run dry in the meantime; those of the own tile have been looked after.
         water.settle(now, to);
     }
+    water.film_goes(from, to, units, now.tick);
     water.texels[to as usize].film += units;
     if let Some(matter) = matter {
         carry_dust(water, matter, Moved { from, to, units, film: before, load });

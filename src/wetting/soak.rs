@@ -6,6 +6,7 @@
 use super::arrivals::{Arrivals, Parcel};
 use super::run_off::LEAST_RETAINED;
 use super::surface::{Now, SurfaceWater, Tiles};
+use crate::emitter::Source;
 use crate::matter::SurfaceMatter;
 use crate::matter::snow::rain_on_snow;
 use crate::matter::wash::splash;
@@ -24,6 +25,8 @@ pub struct Drop {
     pub water_nl: u32,
     /// Speed at which it came, mm/s: what it loosens.
     pub speed_mm: u32,
+    /// Where it came from; unknown unless [sources are tracked](crate::emitter::TrackSources).
+    pub source: Source,
 }
 
 /// Buffers that keep their memory from tick to tick.
@@ -31,6 +34,10 @@ pub struct Drop {
 pub(crate) struct SoakScratch {
     columns: Vec<(u32, [u32; 2])>,
     arrivals: Arrivals,
+    /// Where sources are kept: texels that were hit, and whose the drop was.
+    hits: Vec<(u32, Source)>,
+    /// The same: texels that got water, and the texel that was hit for it.
+    wetted: Vec<(u32, u32)>,
 }
 
 /// Puts the drops of a tick on the surface: to each texel its share of their stamps. What would fall beside the surface's
@@ -46,7 +53,7 @@ pub(crate) fn soak(
     if drops.is_empty() {
         return;
     }
-    let SoakScratch { columns, arrivals } = scratch;
+    let SoakScratch { columns, arrivals, hits, wetted } = scratch;
     let size = water.size;
     let to_texel = |[x, y]: [u32; 2], parcel: Parcel| {
         let under = y * size + x;
@@ -59,10 +66,35 @@ pub(crate) fn soak(
     for drop in drops {
         gather(water, now, drop, columns, arrivals, to_texel);
         water.ledger.received += water.units.from_nl(u64::from(drop.water_nl));
+        if water.origins.is_kept() {
+            hits.push((hit_texel(now, drop, size), drop.source));
+        }
     }
     arrivals.share_out(size, water.wrap, to_texel);
-    arrivals.drain(|[x, y], parcel| put(water, now, y * size + x, parcel, matter.as_deref_mut(), weather));
+    arrivals.drain(|[x, y], parcel| {
+        let texel = y * size + x;
+        if water.origins.is_kept() {
+            wetted.push((texel, parcel.home));
+        }
+        put(water, now, texel, parcel, matter.as_deref_mut(), weather);
+    });
+    name_sources(water, hits, wetted);
     water.rained_at = now.tick;
+}
+
+/// Texels that got water are of the source of the last drop that hit where their water came from.
+fn name_sources(water: &mut SurfaceWater, hits: &mut Vec<(u32, Source)>, wetted: &mut Vec<(u32, u32)>) {
+    // Stable, so that the last drop is the last of its texel.
+    hits.sort_by_key(|&(home, _)| home);
+    for (texel, home) in wetted.drain(..) {
+        let behind = hits.partition_point(|&(other, _)| other <= home);
+        if let Some(&(other, source)) = behind.checked_sub(1).and_then(|last| hits.get(last))
+            && other == home
+        {
+            water.origins.take_over(texel, source);
+        }
+    }
+    hits.clear();
 }
 
 /// Adds a drop to what has come in this tick.

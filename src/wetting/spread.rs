@@ -56,6 +56,7 @@ pub(crate) fn spread(water: &mut SurfaceWater, now: &Now, scratch: &mut SpreadSc
             let room = u32::MAX - water.texels[to as usize].pores;
             let units = units.min(room);
             water.texels[from as usize].pores -= units;
+            water.pores_give(from, to, units, now.tick);
             water.texels[to as usize].pores += units;
             let target = water.tile_of(to);
             water.tiles.touch(target);

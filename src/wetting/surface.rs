@@ -5,8 +5,10 @@ use serde::{Deserialize, Serialize};
 
 use super::evolve::{Amounts, Matter, evolve};
 use super::look::{WaterLook, water_look};
+use super::origin::Origins;
 use super::texel::{Scale, TexelWater, Units};
 use super::{Exposure, Marks, TexelGeometry};
+use crate::emitter::Source;
 use crate::material::PorousMaterial;
 use crate::overlay::{TILE_SIZE, Weatherable, Wrap};
 use crate::weather::{Demand, DryingClock};
@@ -30,6 +32,8 @@ pub struct SurfaceWater {
     pub(crate) notes_dried: bool,
     /// If so: texels whose film has dried up, until [`matter`](crate::matter) takes note.
     pub(crate) dried: Vec<u32>,
+    /// Where its water came from; empty unless somebody asks.
+    pub(crate) origins: Origins,
 }
 
 /// What has become of the water of a surface; units.
@@ -198,6 +202,7 @@ impl SurfaceWater {
             rained_at: 0,
             notes_dried: false,
             dried: Vec::new(),
+            origins: Origins::default(),
         }
     }
 
@@ -280,6 +285,7 @@ impl SurfaceWater {
         self.texels.capacity() * size_of::<TexelWater>()
             + self.marks.capacity() * size_of::<Marks>()
             + 2 * self.tiles.flags.capacity()
+            + self.origins.bytes()
     }
 
     /// Covers all of the surface with water, beside what it has: film and absorbed, mm. It has been there for so long that
@@ -316,6 +322,7 @@ impl SurfaceWater {
             self.tiles.flags = vec![0; (self.size / TILE_SIZE).pow(2) as usize];
             self.tiles.patience = self.tiles.flags.clone();
         }
+        self.make_room_for_origins();
         if marks && self.marks.is_empty() {
             self.marks = vec![Marks::default(); self.texels.len()];
         }
@@ -330,6 +337,7 @@ impl SurfaceWater {
         self.rained_at = 0;
         self.notes_dried = false;
         self.dried.clear();
+        self.make_room_for_origins();
     }
 
     /// The tile of a texel.
@@ -381,6 +389,9 @@ impl SurfaceWater {
             self.settle(now, texel);
         }
         let tile = self.tile_of(texel);
+        if self.origins.is_kept() && self.texels[texel as usize].is_dry() {
+            self.origins.begin(texel, Source::UNKNOWN, now.tick);
+        }
         let water = &mut self.texels[texel as usize];
         let room = u64::from(u32::MAX - water.film);
         let added = units.min(room);
@@ -388,40 +399,6 @@ impl SurfaceWater {
         self.ledger.spilled += units - added;
         self.tiles.touch(tile);
         tile
-    }
-
-    /// A brush brings water to a texel, now. Makes room for the first.
-    pub(crate) fn paint(&mut self, now: &Now, texel: u32, units: u64) {
-        self.wake(now.material.leaves_marks());
-        let tile = self.add(now, texel, units);
-        self.ledger.painted += units;
-        super::note_arrival(self, now, texel, tile);
-        self.rained_at = now.tick;
-    }
-
-    /// A brush takes a part of a texel's water away, 0..=1, now; how much it was, units.
-    pub(crate) fn wipe(&mut self, now: &Now, texel: u32, part: f64) -> u64 {
-        if self.texels.get(texel as usize).is_none_or(TexelWater::is_dry) {
-            return 0;
-        }
-        self.settle(now, texel);
-        let water = &mut self.texels[texel as usize];
-        let before = water.total();
-        // Never more than there is: the conversion saturates, and takes NaN for 0.
-        let left = |units: u32| units - ((f64::from(units) * part).round() as u32).min(units);
-        (water.film, water.pores) = (left(water.film), left(water.pores));
-        let gone = before - water.total();
-        self.ledger.wiped += gone;
-        if gone > 0 {
-            let tile = self.tile_of(texel);
-            self.tiles.touch(tile);
-            // What stands or soaks beside it may come over.
-            self.tiles.run(tile);
-            if now.matter.capacity_mm > 0.0 {
-                self.tiles.spread(tile);
-            }
-        }
-        gone
     }
 
     /// Film and absorbed water of all texels now, and what has evaporated by now; units.

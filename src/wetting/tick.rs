@@ -91,6 +91,7 @@ pub(super) fn advance_water(
     weather: Res<Weather>,
     stats: Res<WettingStats>,
     scratch: Local<Parallel<Scratch>>,
+    mut memory: Local<Vec<SurfaceItem<'static, 'static>>>,
     mut surfaces: Query<Surface>,
 ) {
     let is_busy = |(water, drops, _, matter, deposits, ..): &SurfaceItem| {
@@ -100,7 +101,8 @@ pub(super) fn advance_water(
             || water.rained_at != 0
             || !is_at_rest(water, matter, &weather)
     };
-    let busy: Vec<SurfaceItem> = surfaces.iter_mut().filter(is_busy).collect();
+    let mut busy: Vec<SurfaceItem> = reused(std::mem::take(&mut *memory));
+    busy.extend(surfaces.iter_mut().filter(is_busy));
     let default = PorousMaterial::default();
     let advance = |scratch: &mut Scratch,
                    (
@@ -144,7 +146,31 @@ pub(super) fn advance_water(
         stats.rims.fetch_add(u64::from(measured), Ordering::Relaxed);
     };
     let scratch = &*scratch;
-    for_each_chunk(busy.into_iter(), |item| advance(&mut scratch.borrow_local_mut(), item));
+    for_each_chunk(busy.drain(..), |item| advance(&mut scratch.borrow_local_mut(), item));
+    *memory = reused(busy);
+}
+
+/// The memory of a list for items of another lifetime. Collecting in place, as `Vec` does from a `Vec` of the same layout, takes
+/// none anew.
+fn reused<A, B>(mut list: Vec<A>) -> Vec<B> {
+    list.clear();
+    list.into_iter().filter_map(|_| None).collect()
 }
 
 type SurfaceItem<'w, 's> = bevy::ecs::query::QueryItem<'w, 's, Surface>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lists_keep_their_memory_from_tick_to_tick() {
+        let text = String::from("as long as this function");
+        let mut list: Vec<&str> = reused(Vec::<&'static str>::with_capacity(100));
+        list.push(&text);
+        let memory = list.as_ptr();
+        let list: Vec<&'static str> = reused(list);
+        assert!(list.is_empty() && list.capacity() >= 100);
+        assert_eq!(list.as_ptr(), memory);
+    }
+}

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use bevy_weathering::replay::{ReplayOptions, replay};
 use bevy_weathering::save::SavedScene;
 use bevy_weathering::scenario::Scenario;
+use tempfile::TempDir;
 
 use super::harness::fuzz;
 use super::scenarios::{SMALL, tree};
@@ -20,19 +21,25 @@ impl Drop for PutBack<'_> {
     }
 }
 
-#[test]
-fn spoilt_states_are_restored_or_refused() {
+/// A small scene, saved after so many seconds: the folder of all, the scenario's file, and the folder of what was saved.
+fn kept_after(seconds: f32) -> (TempDir, PathBuf, PathBuf) {
     let tree = tree();
     let scene = tree.path().join("scenarios/scene.ron");
     write(&scene, SMALL);
     let kept = tree.path().join("kept");
     let options = ReplayOptions {
         render: false,
-        seconds: Some(0.5),
+        seconds: Some(seconds),
         save: Some(kept.clone()),
         ..ReplayOptions::new(Scenario::load(&scene).expect("it is whole"))
     };
     replay(&options, |_| ()).expect("it runs");
+    (tree, scene, kept)
+}
+
+#[test]
+fn spoilt_states_are_restored_or_refused() {
+    let (tree, scene, kept) = kept_after(0.5);
     let mut files: Vec<(PathBuf, Vec<u8>)> = Vec::new();
     for entry in fs::read_dir(&kept).expect("it was saved") {
         let file = entry.expect("it can be read").path();
@@ -76,17 +83,7 @@ fn spoilt_states_are_restored_or_refused() {
 #[test]
 #[cfg(unix)]
 fn links_and_pipes_in_a_saved_scene_are_refused() {
-    let tree = tree();
-    let scene = tree.path().join("scenarios/scene.ron");
-    write(&scene, SMALL);
-    let kept = tree.path().join("kept");
-    let options = ReplayOptions {
-        render: false,
-        seconds: Some(0.1),
-        save: Some(kept.clone()),
-        ..ReplayOptions::new(Scenario::load(&scene).expect("it is whole"))
-    };
-    replay(&options, |_| ()).expect("it runs");
+    let (tree, _, kept) = kept_after(0.1);
     let tally = fuzz("links in states", 4, move |number, _| {
         let file = kept.join(["state.ron", "floor_diffuse.png"][number % 2]);
         let elsewhere = tree.path().join(format!("elsewhere{number}"));

@@ -2,23 +2,18 @@
 
 use std::time::{Duration, Instant};
 
-use bevy::app::PanicHandlerPlugin;
-use bevy::asset::RenderAssetUsages;
 use bevy::camera::RenderTarget;
-use bevy::log::LogPlugin;
 use bevy::prelude::*;
 use bevy::render::RenderPlugin;
 use bevy::render::gpu_readback::{Readback, ReadbackComplete};
-use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
-use bevy::render::render_resource::{Extent3d, PollType, TextureDimension, TextureFormat, TextureUsages};
+use bevy::render::render_resource::PollType;
 use bevy::render::renderer::RenderDevice;
 use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
 use bevy::time::TimeUpdateStrategy;
-use bevy::window::ExitCondition;
-use bevy::winit::WinitPlugin;
 use bevy_weathering::WeatheringPlugins;
 use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::material::PorousMaterial;
+use bevy_weathering::offscreen;
 use bevy_weathering::wetting::{SurfaceWater, WetGeometry};
 
 use super::harness;
@@ -55,17 +50,7 @@ pub fn bare_app() -> Option<App> {
 fn bare(synchronous_pipeline_compilation: bool) -> Option<App> {
     harness::gpu()?;
     let mut app = App::new();
-    let no_window =
-        WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
-    app.add_plugins(
-        DefaultPlugins
-            .set(no_window)
-            .set(RenderPlugin { synchronous_pipeline_compilation, ..default() })
-            .disable::<WinitPlugin>()
-            .disable::<PipelinedRenderingPlugin>()
-            .disable::<LogPlugin>()
-            .disable::<PanicHandlerPlugin>(),
-    );
+    app.add_plugins(offscreen::plugins().set(RenderPlugin { synchronous_pipeline_compilation, ..default() }));
     Some(app)
 }
 
@@ -110,14 +95,7 @@ pub fn read_back(app: &mut App, requests: Vec<Readback>) -> Vec<Vec<u8>> {
 
 /// An image that cameras can draw into.
 pub fn add_target(app: &mut App, size: UVec2) -> Handle<Image> {
-    let mut image = Image::new_uninit(
-        Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
-        TextureDimension::D2,
-        TextureFormat::Rgba8UnormSrgb,
-        RenderAssetUsages::RENDER_WORLD,
-    );
-    image.texture_descriptor.usage |= TextureUsages::RENDER_ATTACHMENT;
-    app.world_mut().resource_mut::<Assets<Image>>().add(image)
+    offscreen::target(&mut app.world_mut().resource_mut::<Assets<Image>>(), size)
 }
 
 /// A camera that draws into a target.

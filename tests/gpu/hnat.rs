@@ -5,6 +5,7 @@ use std::f32::consts::FRAC_PI_2;
 use bevy_weathering::material::models::hnat::{PorousParams, hnat_terms, wet_tau};
 
 use super::harness;
+use crate::common::Random;
 
 const SOURCE: (&str, &str) = ("shaders/common/hnat.wgsl", include_str!("../../shaders/common/hnat.wgsl"));
 
@@ -106,30 +107,19 @@ struct GpuOutput {
     padding: u32,
 }
 
-/// SplitMix64 (Steele, Lea, Flood 2014): the same inputs on every machine.
-struct Random(u64);
+/// Draws the same inputs on every machine.
+struct Inputs(Random);
 
-impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
+impl Inputs {
     /// Uniform in `[low, high)`.
     fn within(&mut self, low: f32, high: f32) -> f32 {
-        let unit = (self.bits() >> 40) as f32 / (1u64 << 24) as f32;
+        let unit = (self.0.bits() >> 40) as f32 / (1u64 << 24) as f32;
         low + (high - low) * unit
     }
 
     /// One of `edges` in a quarter of the calls, otherwise uniform in `[low, high)`.
     fn pick(&mut self, low: f32, high: f32, edges: &[f32]) -> f32 {
-        if self.bits() >> 62 == 0 {
-            edges[(self.bits() % edges.len() as u64) as usize]
-        } else {
-            self.within(low, high)
-        }
+        if self.0.bits() >> 62 == 0 { edges[self.0.below(edges.len())] } else { self.within(low, high) }
     }
 
     /// A colour coefficient: exactly 0, or large enough for single precision to resolve what a bounce keeps.
@@ -155,7 +145,7 @@ impl Random {
             t: self.pick(0.0, 1.0, &[0.0, 0.25, 1.0]),
             t_start: self.pick(0.0, 1.0, &[0.0, 0.25, 1.0]),
             t_fill: self.pick(0.01, 0.5, &[0.0, -1.0]),
-            sqrt_k: (self.bits() >> 63) as u32,
+            sqrt_k: (self.0.bits() >> 63) as u32,
             padding: [0; 3],
         }
     }
@@ -205,7 +195,7 @@ fn compare(input: &GpuInput, output: &GpuOutput) -> Vec<(&'static str, f32, f64)
 fn shader_matches_its_twin() {
     const TOLERANCE: f64 = 2e-3;
     let Some(gpu) = harness::gpu() else { return };
-    let mut random = Random(2006);
+    let mut random = Inputs(Random(2006));
     let inputs: Vec<GpuInput> = (0..10_000).map(|_| random.input()).collect();
     let module = harness::compose(&[SOURCE], ENTRY);
     let outputs: Vec<GpuOutput> = harness::run_compute(&gpu, module, &inputs, WORKGROUP_SIZE);

@@ -1,10 +1,10 @@
 //! Pictures: what must look the same, and what must not.
 
-use bevy::light::EnvironmentMapLight;
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::material::{BaseBrdf, DryMaterial, Pores, PorousMaterial, TextureMeaning, WettingModel};
+use bevy_weathering::offscreen::Stage;
 use bevy_weathering::overlay::{OverlayUv, Overlays, Splat, Weatherable, Wrap};
 use image::RgbImage;
 
@@ -13,25 +13,19 @@ use super::splat::{painted, push};
 
 const SIZE: UVec2 = UVec2::new(96, 72);
 
+/// Daylight with shadows, and a camera that looks down at what stands in the middle.
+pub fn stage(world: &mut World, size: UVec2) -> (Stage, Entity) {
+    let sun = DirectionalLight { illuminance: 2500.0, shadow_maps_enabled: true, ..default() };
+    let stage = Stage::new(world, size, sun, Vec3::new(-1.0, -1.5, -0.6));
+    let eye = Transform::from_xyz(0.6, 1.2, 2.6).looking_at(Vec3::new(0.0, 0.4, 0.0), Vec3::Y);
+    let camera = world.spawn(stage.camera(eye)).id();
+    (stage, camera)
+}
+
 /// A ball on a floor under one light of each kind and an environment map, drawn once.
 fn draw(surface: Option<PorousMaterial>, metallic: f32, water_mm: f32) -> Option<RgbImage> {
     let mut app = app()?;
-    let target = add_target(&mut app, SIZE);
-    let eye = camera(&target, Vec3::new(0.6, 1.2, 2.6), Vec3::new(0.0, 0.4, 0.0));
-    let camera = app.world_mut().spawn(eye).id();
-    let environment = {
-        let mut images = app.world_mut().resource_mut::<Assets<Image>>();
-        EnvironmentMapLight {
-            intensity: 400.0,
-            ..EnvironmentMapLight::hemispherical_gradient(
-                &mut images,
-                Color::linear_rgb(0.5, 0.7, 1.0),
-                Color::linear_rgb(0.8, 0.8, 0.8),
-                Color::linear_rgb(0.25, 0.2, 0.15),
-            )
-        }
-    };
-    app.world_mut().entity_mut(camera).insert(environment);
+    let (stage, _) = stage(app.world_mut(), SIZE);
     let material = StandardMaterial {
         base_color: Color::linear_rgb(0.5, 0.3, 0.2),
         perceptual_roughness: 0.6,
@@ -58,10 +52,6 @@ fn draw(surface: Option<PorousMaterial>, metallic: f32, water_mm: f32) -> Option
         }
     }
     app.world_mut().spawn((
-        DirectionalLight { illuminance: 2500.0, shadow_maps_enabled: true, ..default() },
-        Transform::default().looking_to(Vec3::new(-1.0, -1.5, -0.6), Vec3::Y),
-    ));
-    app.world_mut().spawn((
         PointLight { intensity: 60_000.0, shadow_maps_enabled: true, ..default() },
         Transform::from_xyz(-1.2, 1.0, 0.8),
     ));
@@ -87,7 +77,7 @@ fn draw(surface: Option<PorousMaterial>, metallic: f32, water_mm: f32) -> Option
         update(&mut app);
     }
     assert!(app.world().resource::<WeatheringClock>().tick() > 1);
-    Some(picture(&mut app, &target))
+    Some(picture(&mut app, &stage.target))
 }
 
 /// Water, in mm, that the ball and the floor can just take up.
@@ -101,7 +91,8 @@ pub fn difference(a: &RgbImage, b: &RgbImage) -> (f64, u8) {
     (sum / a.as_raw().len() as f64, differences.max().unwrap_or(0))
 }
 
-fn mean(picture: &RgbImage) -> f64 {
+/// Mean brightness, of 255.
+pub fn mean(picture: &RgbImage) -> f64 {
     picture.as_raw().iter().map(|&byte| f64::from(byte)).sum::<f64>() / picture.as_raw().len() as f64
 }
 

@@ -76,6 +76,11 @@ pub(super) fn painted(app: &mut App, splats: u64) {
     update_until(app, "the splats to be painted", |world| world.resource::<SplatStats>().splats() >= splats);
 }
 
+/// Texels that have got colour.
+fn painted_texels(maps: &CpuMaps) -> usize {
+    maps.diffuse.iter().filter(|texel| texel[3] > 0).count()
+}
+
 #[test]
 fn gpu_and_cpu_agree_to_the_bit_for_every_edge_behaviour() {
     let Some(mut app) = app() else { return };
@@ -98,6 +103,7 @@ fn gpu_and_cpu_agree_to_the_bit_for_every_edge_behaviour() {
             painted(&mut app, all);
         }
         let maps = maps_of(&mut app, entity, &surface);
+        assert!(painted_texels(&reference) > (SIZE * SIZE / 4) as usize);
         assert_eq!(maps.diffuse, reference.diffuse, "{surface:?}");
         assert_eq!(maps.specular, reference.specular, "{surface:?}");
         assert_eq!(maps.normal, reference.normal, "{surface:?}");
@@ -179,7 +185,8 @@ fn a_stamp_in_the_corner_deposits_what_one_in_the_middle_does() {
     let Some(mut app) = app() else { return };
     let surface = Weatherable { map_size: SIZE, wrap_u: Wrap::Repeat, wrap_v: Wrap::Repeat, ..default() };
     let (corner, middle) = (spawn_surface(&mut app, surface), spawn_surface(&mut app, surface));
-    let mut splat = Splat { center: [40, 200], ..random_splats(1, 9)[0] };
+    let opaque = Splat { diffuse: 0xff20_80c0, specular: 0xff00_4020, ..random_splats(1, 9)[0] };
+    let mut splat = Splat { center: [40, 200], ..opaque };
     (splat.radius, splat.water_nl) = ([1700, 2300], 4_188_790);
     push(&mut app, corner, &[splat]);
     let half = SIZE as i32 * 128;
@@ -192,6 +199,7 @@ fn a_stamp_in_the_corner_deposits_what_one_in_the_middle_does() {
             let here = (y * SIZE + x) as usize;
             let there = ((y + SIZE / 2) % SIZE * SIZE + (x + SIZE / 2) % SIZE) as usize;
             assert_eq!(corner.diffuse[here], middle.diffuse[there]);
+            assert_eq!(corner.specular[here], middle.specular[there]);
             assert_eq!(corner.normal[here], middle.normal[there]);
             // Out of reach of a stamp of 6.6 by 9 texels around (64.2, 64.8).
             let far = |at: u32, middle: f32, radius: f32| (at as f32 + 0.5 - middle).abs() > radius + 1.0;
@@ -202,6 +210,8 @@ fn a_stamp_in_the_corner_deposits_what_one_in_the_middle_does() {
         }
     }
     assert!(untouched > SIZE * SIZE * 9 / 10);
+    // Of the 187 texels of its disc all but those at the rim.
+    assert!(painted_texels(&corner) > 120);
 }
 
 #[test]

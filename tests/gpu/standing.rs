@@ -11,7 +11,7 @@ use bevy_weathering::scenes::meshes;
 use image::RgbImage;
 
 use super::app::{add_target, app, camera, cover, picture, still, update, update_until};
-use super::images::difference;
+use super::images::{difference, mean};
 
 const SIZE: UVec2 = UVec2::new(96, 96);
 
@@ -217,10 +217,6 @@ fn light_comes_through_wet_cloth() {
     cover(&mut scene.app, scene.surface, 0.0, 0.5);
     let wet = mean(&scene.after(6));
     assert!(wet > 1.3 * dry, "dry {dry}, wet {wet}");
-}
-
-fn mean(picture: &RgbImage) -> f64 {
-    picture.as_raw().iter().map(|&byte| f64::from(byte)).sum::<f64>() / picture.as_raw().len() as f64
 }
 
 /// The picture of bright ground under one model, dry and with a quarter more of what it takes up each time.

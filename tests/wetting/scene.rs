@@ -6,6 +6,7 @@ use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 use bevy_weathering::WeatheringPlugins;
 use bevy_weathering::clock::{ClockPlugin, WeatheringClock};
+use bevy_weathering::emitter::Source;
 use bevy_weathering::overlay::CpuOverlayPlugin;
 use bevy_weathering::prelude::*;
 use bevy_weathering::weather::Weather;
@@ -79,7 +80,13 @@ impl Scene {
         let size = self.water(surface).size() as f32;
         let center = [uv.x, uv.y].map(|part| (part * size * 256.0) as i32);
         let mut queue = self.0.world_mut().get_mut::<DropQueue>(surface).unwrap();
-        queue.0.push(Drop { center, radius: [radius * 256; 2], water_nl, speed_mm: 0 });
+        queue.0.push(Drop {
+            center,
+            radius: [radius * 256; 2],
+            water_nl,
+            speed_mm: 0,
+            source: Source::UNKNOWN,
+        });
     }
 
     /// Whether a surface comes to rest within so many seconds.

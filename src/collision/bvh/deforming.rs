@@ -15,11 +15,12 @@ use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
+use obvhs::bvh2::node::Bvh2Node;
 use obvhs::ray::RayHit;
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
 
-use super::{HEAD_START, LocalHit, Segment, corners_of, intersect, pad_within, padded, quality};
+use super::{LocalHit, Segment, corners_of, intersect, pad_within, padded, quality};
 
 /// A tree that costs this many times what it did when it was built is built anew.
 const REBUILD_COST: f64 = 2.0;
@@ -61,6 +62,11 @@ impl DeformingBvh {
         }
     }
 
+    /// The tree, the root first; empty while nothing can be hit.
+    pub(super) fn nodes(&self) -> &[Bvh2Node] {
+        if self.bounds.is_some() { &self.bvh.nodes } else { &[] }
+    }
+
     /// Smallest and largest corner of everything that can be hit, with some rounding errors to spare; `None` if nothing
     /// can.
     pub(in crate::collision) fn bounds(&self) -> Option<(Vec3, Vec3)> {
@@ -74,12 +80,9 @@ impl DeformingBvh {
         self.bounds?;
         let mut hit = RayHit::none();
         let ray = segment.ray(fraction);
-        self.bvh.ray_traverse(ray, &mut hit, |ray, leaf| intersect(&self.leaves[leaf], ray)).then(|| {
-            LocalHit {
-                fraction: hit.t - HEAD_START,
-                triangle: self.bvh.primitive_indices[hit.primitive_id as usize],
-            }
-        })
+        self.bvh
+            .ray_traverse(ray, &mut hit, |ray, leaf| intersect(&self.leaves[leaf], ray))
+            .then(|| LocalHit::new(&hit, &self.bvh.primitive_indices))
     }
 
     fn rebuild(&mut self, positions: &[Vec3], quality: BvhBuildParams) {

@@ -6,11 +6,13 @@
 //! | `deforming` | [`DeformingBvh`]: the triangles of one surface that is posed, refitted when it moves |
 //! | `boxes` | [`BoxBvh`]: the boxes of all surfaces |
 //! | `overlaps` | nothing: [`BoxOverlaps`] tells which of many boxes overlap one |
+//! | `levels` | nothing: the boxes of a tree, to be looked at |
 //!
 //! obvhs has a glam of its own version; values cross over as arrays, so that no lock file can make them differ.
 
 mod boxes;
 mod deforming;
+mod levels;
 mod overlaps;
 
 use bevy::prelude::*;
@@ -110,12 +112,17 @@ impl MeshBvh {
     pub(super) fn cast_within(&self, segment: Segment, fraction: f32) -> Option<LocalHit> {
         let mut hit = RayHit::none();
         let ray = segment.ray(fraction);
-        self.bvh.ray_traverse(ray, &mut hit, |ray, leaf| intersect(&self.leaves[leaf], ray)).then(|| {
-            LocalHit {
-                fraction: hit.t - HEAD_START,
-                triangle: self.bvh.primitive_indices[hit.primitive_id as usize],
-            }
-        })
+        self.bvh
+            .ray_traverse(ray, &mut hit, |ray, leaf| intersect(&self.leaves[leaf], ray))
+            .then(|| LocalHit::new(&hit, &self.bvh.primitive_indices))
+    }
+}
+
+impl LocalHit {
+    /// From what a tree over triangles in this order says of the ray of a [`Segment`].
+    #[inline]
+    fn new(hit: &RayHit, triangles: &[u32]) -> Self {
+        Self { fraction: hit.t - HEAD_START, triangle: triangles[hit.primitive_id as usize] }
     }
 }
 

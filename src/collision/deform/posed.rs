@@ -85,6 +85,12 @@ impl PosedMesh {
         self.bvh.bounds()
     }
 
+    /// Boxes so many levels below the outermost one, as [`MeshBvh::boxes`]; but the tree is binary: three of its levels are about
+    /// one of the other.
+    pub fn boxes(&self, level: u32, most: usize) -> Vec<(Vec3, Vec3)> {
+        self.bvh.boxes(level, most)
+    }
+
     /// The closest hit on the segment from `start` to `end`, as [`MeshBvh::cast`].
     pub fn cast(&self, start: Vec3, end: Vec3) -> Option<LocalHit> {
         self.cast_within(Segment::new(start, end)?, 1.0)

@@ -13,10 +13,12 @@ mod mips;
 mod pass;
 mod prepare;
 mod stats;
+mod texels;
 
 use bevy::asset::embedded_asset;
 use bevy::core_pipeline::schedule::camera_driver;
 use bevy::prelude::*;
+use bevy::render::render_resource::SpecializedComputePipelines;
 use bevy::render::renderer::RenderGraph;
 use bevy::render::{ExtractSchedule, Render, RenderApp, RenderStartup, RenderSystems};
 use bevy::shader::load_shader_library;
@@ -71,8 +73,9 @@ impl Plugin for GpuOverlayPlugin {
             .insert_resource(stats)
             .init_resource::<prepare::PendingSplats>()
             .init_resource::<prepare::SplatBatches>()
-            .init_resource::<prepare::StampBuffer>()
+            .init_resource::<prepare::StampTexture>()
             .init_resource::<mips::MipBatches>()
+            .init_resource::<SpecializedComputePipelines<pass::SplatPipeline>>()
             .add_systems(RenderStartup, (pass::init_splat_pipeline, mips::init_mip_pipeline))
             .add_systems(ExtractSchedule, (prepare::extract_splats, prepare::extract_stamps).chain())
             .add_systems(Render, prepare::prepare_splats.in_set(RenderSystems::PrepareBindGroups))

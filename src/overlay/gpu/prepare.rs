@@ -6,8 +6,8 @@ use bevy::ecs::entity::EntityHashMap;
 use bevy::prelude::*;
 use bevy::render::render_asset::RenderAssets;
 use bevy::render::render_resource::{
-    BindGroup, BindGroupEntries, Buffer, BufferInitDescriptor, BufferUsages, DynamicUniformBuffer,
-    PipelineCache, RawBufferVec, ShaderType,
+    BindGroup, BindGroupEntries, Buffer, BufferInitDescriptor, BufferUsages, CachedComputePipelineId,
+    DynamicUniformBuffer, PipelineCache, RawBufferVec, ShaderType, SpecializedComputePipelines, TextureView,
 };
 use bevy::render::renderer::{RenderDevice, RenderQueue};
 use bevy::render::storage::{GpuShaderBuffer, ShaderBuffer};
@@ -18,7 +18,8 @@ use super::SplatStats;
 use super::backlog::Backlog;
 use super::maps::Overlays;
 use super::mips::{MipBatches, MipPipeline, SurfaceLevels};
-use super::pass::SplatPipeline;
+use super::pass::{SplatKinds, SplatPipeline};
+use super::texels::{TexelRows, stamp_texture};
 use crate::overlay::{
     Lying, Splat, SplatBudget, SplatQueue, StampAtlas, SurfaceFrames, TexelFrame, TileBins, TileHeader, Wrap,
 };
@@ -30,6 +31,8 @@ pub struct SurfaceBatch {
     pub size: u32,
     /// The batch's first row in the tile buffer.
     pub first_tile: u32,
+    /// How many rows it has there.
+    pub tiles: u32,
     /// Edges along u and v: 1 clamps, 0 repeats.
     pub clamped: UVec2,
 }
@@ -155,17 +158,17 @@ pub(super) fn extract_splats(
 
 /// The stamps on the GPU.
 #[derive(Resource, Default)]
-pub(super) struct StampBuffer {
+pub(super) struct StampTexture {
     atlas: StampAtlas,
-    buffer: Option<Buffer>,
+    texture: Option<TextureView>,
 }
 
 /// Takes over what has been added to the atlas.
-pub(super) fn extract_stamps(atlas: Extract<Option<Res<StampAtlas>>>, mut stamps: ResMut<StampBuffer>) {
+pub(super) fn extract_stamps(atlas: Extract<Option<Res<StampAtlas>>>, mut stamps: ResMut<StampTexture>) {
     if let Some(atlas) = &*atlas
         && atlas.len() != stamps.atlas.len()
     {
-        *stamps = StampBuffer { atlas: StampAtlas::clone(atlas), buffer: None };
+        *stamps = StampTexture { atlas: StampAtlas::clone(atlas), texture: None };
     }
 }
 
@@ -184,9 +187,9 @@ fn fixed_buffer<T: bytemuck::Pod + Default>(device: &RenderDevice, label: &str, 
 #[derive(Resource)]
 pub(super) struct SplatBatches {
     batches: DynamicUniformBuffer<SurfaceBatch>,
-    splats: RawBufferVec<Splat>,
+    splats: TexelRows<Splat>,
     tiles: RawBufferVec<TileHeader>,
-    list: RawBufferVec<u32>,
+    list: TexelRows<u32>,
     bins: TileBins,
     /// For surfaces on which nothing lies in space.
     no_frames: Option<Buffer>,
@@ -199,6 +202,7 @@ pub(super) struct SplatBatches {
 
 /// One dispatch.
 pub(super) struct Job {
+    pub(super) pipeline: CachedComputePipelineId,
     pub(super) surface: BindGroup,
     pub(super) batch_offset: u32,
     pub(super) tiles: u32,
@@ -208,9 +212,9 @@ impl Default for SplatBatches {
     fn default() -> Self {
         Self {
             batches: DynamicUniformBuffer::default(),
-            splats: RawBufferVec::new(BufferUsages::STORAGE),
+            splats: TexelRows::splats(),
             tiles: RawBufferVec::new(BufferUsages::STORAGE),
-            list: RawBufferVec::new(BufferUsages::STORAGE),
+            list: TexelRows::list(),
             bins: TileBins::default(),
             no_frames: None,
             no_mask: None,
@@ -226,7 +230,8 @@ pub(super) fn prepare_splats(
     mut pending: ResMut<PendingSplats>,
     mut batches: ResMut<SplatBatches>,
     mut mips: ResMut<MipBatches>,
-    mut stamps: ResMut<StampBuffer>,
+    mut stamps: ResMut<StampTexture>,
+    mut pipelines: ResMut<SpecializedComputePipelines<SplatPipeline>>,
     stats: Res<SplatStats>,
     pipeline: Res<SplatPipeline>,
     mip_pipeline: Res<MipPipeline>,
@@ -240,15 +245,15 @@ pub(super) fn prepare_splats(
     jobs.clear();
     mips.clear();
     if pending.len() == 0
-        || cache.get_compute_pipeline(pipeline.pipeline).is_none()
+        || !pipeline.is_ready(&cache)
         || cache.get_compute_pipeline(mip_pipeline.pipeline).is_none()
     {
         return;
     }
     batches.clear();
-    splats.clear();
+    splats.values.clear();
     tiles.clear();
-    list.clear();
+    list.values.clear();
     let (mut room, mut bytes) = pending.budget.of_a_frame();
     let PendingSplats { surfaces, first, .. } = &mut *pending;
     let count = surfaces.len();
@@ -270,16 +275,16 @@ pub(super) fn prepare_splats(
             continue;
         }
         let first_tile = tiles.len() as u32;
-        let first_splat = splats.len() as u32;
-        let first_entry = list.len();
+        let first_splat = splats.values.len() as u32;
+        let first_entry = list.values.len();
         let frames = waiting.frames.as_ref();
         let batch = waiting.backlog.waiting();
         let batch = &batch[..batch.len().min(room)];
-        let (headers, entries) = (tiles.values_mut(), list.values_mut());
+        let (headers, entries) = (tiles.values_mut(), &mut list.values);
         let taken = bins.bin_within(bytes, batch, size, wrap, frames, first_splat, headers, entries);
         let batch = &batch[..taken];
-        let in_space = batch.iter().any(|splat| splat.in_space != 0);
-        if in_space
+        let kinds = SplatKinds::of(batch);
+        if kinds.in_space()
             && waiting.frame_buffer.is_none()
             && let Some(frames) = frames
         {
@@ -297,11 +302,12 @@ pub(super) fn prepare_splats(
             let lying = waiting.lying.as_ref().unwrap_or(no_mask);
             SurfaceLevels::new(maps, lying, masked, &mip_pipeline, &cache, &device)
         }));
-        splats.values_mut().extend_from_slice(batch);
+        splats.values.extend_from_slice(batch);
         let touched = tiles.len() as u32 - first_tile;
         mips.add(levels, size, &tiles.values()[first_tile as usize..]);
         let clamped = UVec2::from_array(wrap.map(|wrap| u32::from(wrap == Wrap::Clamp)));
         jobs.push(Job {
+            pipeline: pipeline.painting(kinds, &mut pipelines, &cache),
             surface: device.create_bind_group(
                 "weathering surface",
                 &cache.get_bind_group_layout(&pipeline.surface_layout),
@@ -313,12 +319,13 @@ pub(super) fn prepare_splats(
                     frame_buffer.as_entire_buffer_binding(),
                 )),
             ),
-            batch_offset: batches.push(&SurfaceBatch { size, first_tile, clamped }),
+            batch_offset: batches.push(&SurfaceBatch { size, first_tile, tiles: touched, clamped }),
             tiles: touched,
         });
         stats.add(taken, touched as usize);
         room -= taken;
-        bytes = bytes.saturating_sub(TileBins::bytes(taken, touched as usize, list.len() - first_entry));
+        bytes =
+            bytes.saturating_sub(TileBins::bytes(taken, touched as usize, list.values.len() - first_entry));
         stats.carry(waiting.backlog.finish(taken));
         if !waiting.backlog.is_empty() {
             next = next.or(Some(index + 1));
@@ -327,21 +334,18 @@ pub(super) fn prepare_splats(
     *first = next.unwrap_or(begin);
     stats.set_pending(pending.len());
     batches.write_buffer(&device, &queue);
-    splats.write_buffer(&device, &queue);
     tiles.write_buffer(&device, &queue);
-    list.write_buffer(&device, &queue);
     mips.write(&mip_pipeline, &cache, &device, &queue);
-    let (Some(batches), Some(splats), Some(tiles), Some(list)) =
-        (batches.binding(), splats.binding(), tiles.binding(), list.binding())
-    else {
+    let (Some(batches), Some(tiles)) = (batches.binding(), tiles.binding()) else {
         return;
     };
-    let StampBuffer { atlas, buffer } = &mut *stamps;
-    let stamps = buffer.get_or_insert_with(|| fixed_buffer(&device, "weathering stamps", atlas.texels()));
+    let StampTexture { atlas, texture } = &mut *stamps;
+    let stamps = &*texture.get_or_insert_with(|| stamp_texture(atlas, &device, &queue));
+    let (splats, list) = (splats.upload(&device, &queue), list.upload(&device, &queue));
     *frame = Some(device.create_bind_group(
         "weathering splats",
         &cache.get_bind_group_layout(&pipeline.frame_layout),
-        &BindGroupEntries::sequential((batches, splats, tiles, list, stamps.as_entire_buffer_binding())),
+        &BindGroupEntries::sequential((batches, splats, tiles, list, stamps)),
     ));
 }
 

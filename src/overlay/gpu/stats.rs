@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use bevy::diagnostic::DiagnosticPath;
 use bevy::prelude::*;
 
 /// What the pass has done since the start; the same numbers in the main and in the render world.
@@ -20,6 +21,13 @@ struct Counters {
 }
 
 impl SplatStats {
+    /// The pass by its name in Bevy's render diagnostics.
+    pub(super) const SPAN: &'static str = "paint_splats";
+
+    /// Time of the pass on the GPU, ms: among Bevy's diagnostics, in apps with its `RenderDiagnosticsPlugin` on GPUs that have
+    /// timestamps.
+    pub const GPU_TIME: DiagnosticPath = DiagnosticPath::const_new("render/paint_splats/elapsed_gpu");
+
     /// Splats painted.
     pub fn splats(&self) -> u64 {
         self.0.splats.load(Ordering::Relaxed)

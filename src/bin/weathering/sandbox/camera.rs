@@ -2,7 +2,7 @@
 //!
 //! Both ways share one state: an eye looks at a target from a distance. What differs is which of them stays where it is.
 
-use bevy::input::mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll};
+use bevy::input::mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll, MouseScrollUnit};
 use bevy::prelude::*;
 use bevy_weathering::collision::CollisionScene;
 use bevy_weathering::scenario::ScenarioCamera;
@@ -130,8 +130,16 @@ fn steer(
             }
         }
         if !input.pointer && scroll.delta.y != 0.0 {
-            view.zoom(scroll.delta.y);
+            view.zoom(notches(&scroll));
         }
+    }
+}
+
+/// Touchpads tell pixels, wheels lines.
+fn notches(scroll: &AccumulatedMouseScroll) -> f32 {
+    match scroll.unit {
+        MouseScrollUnit::Line => scroll.delta.y,
+        MouseScrollUnit::Pixel => scroll.delta.y / MouseScrollUnit::SCROLL_UNIT_CONVERSION_FACTOR,
     }
 }
 
@@ -237,6 +245,13 @@ mod tests {
             let seen = world_from_view.compute_affine().inverse().transform_point3(point);
             assert!(seen.z < 0.0 && (seen.y / -seen.z).abs() <= (fov * 0.5).tan() + 1e-3, "{seen}");
         }
+    }
+
+    #[test]
+    fn a_touchpad_is_no_faster_than_a_wheel() {
+        let scroll = |unit, pixels| notches(&AccumulatedMouseScroll { unit, delta: Vec2::Y * pixels });
+        assert_eq!(scroll(MouseScrollUnit::Line, 2.0), 2.0);
+        assert_eq!(scroll(MouseScrollUnit::Pixel, 50.0), 0.5);
     }
 
     #[test]

@@ -3,41 +3,29 @@
 
 use bevy::prelude::*;
 use bevy_egui::egui;
-use bevy_weathering::effect::{Carries, DropSizes, EffectTable, WeatherEffect};
+use bevy_weathering::effect::{Carries, DropSizes, EffectTable, ShippedEffect, WeatherEffect};
 use bevy_weathering::emitter::Emitter;
 
 use super::theme;
 use super::ui::{AddPanel, Place};
 use super::widgets::number;
 
-/// Names and texts.
-const SHIPPED: [(&str, &str); 7] = [
-    ("hose", include_str!("../../../../assets/effects/hose.effect.ron")),
-    ("rain", include_str!("../../../../assets/effects/rain.effect.ron")),
-    ("drizzle", include_str!("../../../../assets/effects/drizzle.effect.ron")),
-    ("soak", include_str!("../../../../assets/effects/soak.effect.ron")),
-    ("snow", include_str!("../../../../assets/effects/snow.effect.ron")),
-    ("dust", include_str!("../../../../assets/effects/dust.effect.ron")),
-    ("mud", include_str!("../../../../assets/effects/mud.effect.ron")),
-];
-
 /// The effects that come with the project, by name. Made when they are first asked for.
 #[derive(Resource, Default)]
-pub struct Shipped([Option<Handle<WeatherEffect>>; SHIPPED.len()]);
+pub struct Shipped([Option<Handle<WeatherEffect>>; ShippedEffect::ALL.len()]);
 
 /// Names of the effects that come with the project.
 pub fn names() -> impl Iterator<Item = &'static str> {
-    SHIPPED.iter().map(|(name, _)| *name)
+    ShippedEffect::ALL.into_iter().map(|shipped| shipped.name)
 }
 
 /// An effect that comes with the project.
 pub fn shipped(world: &mut World, name: &str) -> Option<Handle<WeatherEffect>> {
-    let index = SHIPPED.iter().position(|(known, _)| *known == name)?;
+    let index = names().position(|known| known == name)?;
     if let Some(handle) = &world.resource::<Shipped>().0[index] {
         return Some(handle.clone());
     }
-    let made = WeatherEffect::from_ron(SHIPPED[index].1.as_bytes()).and_then(WeatherEffect::with_stamps);
-    let effect = made.map_err(|error| error!("effect {name}: {error}")).ok()?;
+    let effect = ShippedEffect::ALL[index].read().map_err(|error| error!("effect {name}: {error}")).ok()?;
     let handle = world.resource_mut::<Assets<WeatherEffect>>().add(effect);
     world.resource_mut::<Shipped>().0[index] = Some(handle.clone());
     Some(handle)
@@ -64,12 +52,9 @@ fn in_use(world: &mut World) -> Vec<(String, Handle<WeatherEffect>)> {
     let shipped = &world.resource::<Shipped>().0;
     let rows = world.resource::<EffectTable>().rows();
     let named = |handle: &Handle<WeatherEffect>| {
-        let by_name =
-            SHIPPED.iter().zip(shipped).find(|(_, known)| matches!(known, Some(known) if known == handle));
+        let by_name = names().zip(shipped).find(|(_, known)| known.as_ref() == Some(handle));
         let by_emitter = of_emitters.iter().find(|(_, effect)| effect == handle);
-        by_name
-            .map(|((name, _), _)| (*name).to_owned())
-            .or_else(|| by_emitter.map(|(name, _)| format!("of {name}")))
+        by_name.map(|(name, _)| name.to_owned()).or_else(|| by_emitter.map(|(name, _)| format!("of {name}")))
     };
     rows.iter()
         .enumerate()

@@ -21,13 +21,15 @@ const KEYS: &[(&str, &str)] = &[
     ("Ctrl+Z", "take a stroke back"),
     ("Space", "pause, go on"),
     ("N", "one tick"),
+    (", .", "time half, twice as fast"),
     ("R", "start over"),
     ("U", "hide panels, show them"),
     ("M, P", "maps, plots"),
+    ("V", "what surfaces show: look, wetness, film, saturation, source"),
     ("F12", "picture without panels"),
     ("F11", "begin, end a sequence of pictures"),
     ("? or F1", "this list"),
-    ("Escape", "leave"),
+    ("Escape", "close this list; leave"),
 ];
 
 pub fn plugin(app: &mut App) {
@@ -40,8 +42,14 @@ fn reset(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
     }
 }
 
-fn leave(keys: Res<ButtonInput<KeyCode>>, mut exit: MessageWriter<AppExit>) {
-    if keys.just_pressed(KeyCode::Escape) {
+fn leave(keys: Res<ButtonInput<KeyCode>>, mut help: ResMut<Help>, mut exit: MessageWriter<AppExit>) {
+    if !keys.just_pressed(KeyCode::Escape) {
+        return;
+    }
+    // What is in front goes first.
+    if help.0 {
+        help.0 = false;
+    } else {
         exit.write(AppExit::Success);
     }
 }
@@ -60,6 +68,9 @@ fn choose(keys: Res<ButtonInput<KeyCode>>, mut settings: ResMut<Settings>, mut h
     }
     if pressed(KeyCode::KeyP) {
         settings.plots = !settings.plots;
+    }
+    if pressed(KeyCode::KeyV) {
+        settings.views.shade = settings.views.shade.following();
     }
     if pressed(KeyCode::KeyC) {
         settings.flies = !settings.flies;
@@ -80,13 +91,18 @@ fn choose(keys: Res<ButtonInput<KeyCode>>, mut settings: ResMut<Settings>, mut h
 
 /// The list of all keys.
 pub fn show_help(context: &egui::Context, open: &mut bool) {
-    egui::Window::new("Keys").open(open).resizable(false).default_pos([340.0, 60.0]).show(context, |ui| {
-        egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
-            for (key, does) in KEYS {
-                ui.strong(*key);
-                ui.label(*does);
-                ui.end_row();
-            }
+    // Where panels are large, the list is longer than the window is high.
+    let most = (context.viewport_rect().height() - 110.0).max(80.0);
+    let window = egui::Window::new("Keys").open(open).resizable(false).default_pos([340.0, 60.0]);
+    window.show(context, |ui| {
+        egui::ScrollArea::vertical().max_height(most).show(ui, |ui| {
+            egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
+                for (key, does) in KEYS {
+                    ui.strong(*key);
+                    ui.label(*does);
+                    ui.end_row();
+                }
+            });
         });
     });
 }

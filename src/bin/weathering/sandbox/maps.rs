@@ -4,12 +4,14 @@ use std::time::Instant;
 
 use bevy::prelude::*;
 use bevy_egui::{EguiTextureHandle, EguiUserTextures, egui};
+use bevy_weathering::emitter::Source;
 use bevy_weathering::matter::SurfaceMatter;
 use bevy_weathering::overlay::Overlays;
-use bevy_weathering::wetting::{SurfaceWater, WetGeometry, Wetness, WetnessQuery};
+use bevy_weathering::wetting::{SurfaceWater, TexelGeometry, WetGeometry, Wetness, WetnessQuery};
 
 use super::selection::{Selected, choose_surface};
 use super::settings::Settings;
+use super::sources;
 use super::ui::{AddPanel, Place};
 
 /// Samples along each side.
@@ -24,6 +26,7 @@ enum Channel {
     Film,
     Absorbed,
     Saturation,
+    Source,
     Dust,
     Mud,
     Snow,
@@ -33,11 +36,12 @@ enum Channel {
 }
 
 impl Channel {
-    const ALL: [(Self, &'static str); 10] = [
+    const ALL: [(Self, &'static str); 11] = [
         (Self::Wetness, "looks wet"),
         (Self::Film, "film"),
         (Self::Absorbed, "absorbed"),
         (Self::Saturation, "pores full"),
+        (Self::Source, "source"),
         (Self::Dust, "dust"),
         (Self::Mud, "mud"),
         (Self::Snow, "snow"),
@@ -111,8 +115,7 @@ fn sample(
     let Ok((water, geometry, matter)) = surfaces.get(surface) else { return };
     let of_matter = |uv: Vec2| {
         let (matter, size) = (matter?, water.size());
-        let [x, y] = [uv.x, uv.y].map(|along| ((along * size as f32) as u32).min(size.saturating_sub(1)));
-        let texel = y * size + x;
+        let texel = texel_under(size, uv);
         let held = matter.texels().get(texel as usize)?;
         let units = match channel {
             Channel::Dust => held.dust,
@@ -128,6 +131,10 @@ fn sample(
         let uv = Vec2::new(middle(index % SIDE), middle(index / SIDE));
         match channel {
             Channel::Dust | Channel::Mud | Channel::Snow => of_matter(uv).unwrap_or(0.0),
+            Channel::Source => {
+                let origin = texel_at(water.size(), &geometry.0, uv).and_then(|texel| water.origin(texel));
+                f32::from(origin.unwrap_or_default().source.0)
+            }
             _ => wetness.at_uv(surface, uv).map_or(0.0, |wetness| channel.of_water(&wetness)),
         }
     };
@@ -137,13 +144,25 @@ fn sample(
     view.is_new = true;
 }
 
+/// The texel below a uv of 0..=1, of a map with so many along each side.
+fn texel_under(size: u32, uv: Vec2) -> u32 {
+    let [x, y] = [uv.x, uv.y].map(|along| ((along * size as f32) as u32).min(size.saturating_sub(1)));
+    y * size + x
+}
+
+/// The texel in which the water of a place is; `None` while the map is measured anew.
+pub fn texel_at(size: u32, geometry: &TexelGeometry, uv: Vec2) -> Option<u32> {
+    let under = texel_under(size, uv);
+    (geometry.size() == size).then(|| geometry.stand_in(under).unwrap_or(under))
+}
+
 /// What the brightest colour stands for.
 fn most(values: &[f32], channel: Channel) -> f32 {
     if channel.is_part() { 1.0 } else { values.iter().copied().fold(1e-3, f32::max) }
 }
 
 /// From black over blue to white.
-fn colour(part: f32) -> egui::Color32 {
+pub fn colour(part: f32) -> egui::Color32 {
     let byte = |from: f32, to: f32| (((part - from) / (to - from)).clamp(0.0, 1.0) * 255.0) as u8;
     egui::Color32::from_rgb(byte(0.6, 1.0), byte(0.25, 0.9), byte(0.0, 0.6))
 }
@@ -179,7 +198,10 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     let most = most(&view.values, channel);
     if view.is_new || view.texture.is_none() {
         view.is_new = false;
-        let pixels = view.values.iter().map(|value| colour(value / most)).collect();
+        let of_source = |value: f32| sources::colour(Source(value as u16));
+        let is_source = channel == Channel::Source;
+        let pixel = |value: &f32| if is_source { of_source(*value) } else { colour(value / most) };
+        let pixels = view.values.iter().map(pixel).collect();
         let image = egui::ColorImage::new([SIDE, SIDE], pixels);
         let options = egui::TextureOptions::NEAREST;
         match &mut view.texture {
@@ -189,14 +211,23 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     }
     let Some(texture) = &view.texture else { return };
     let shown = ui.add(egui::Image::new((texture.id(), size)).sense(egui::Sense::hover()));
-    let unit = if channel.is_part() { "" } else { " mm" };
-    ui.small(format!("white is {most:.3}{unit}"));
-    if let Some(at) = shown.hover_pos() {
+    let hovered = shown.hover_pos().and_then(|at| {
         let part = (at - shown.rect.min) / shown.rect.size();
         let [x, y] = [part.x, part.y].map(|part| ((part * SIDE as f32) as usize).min(SIDE - 1));
-        if let Some(value) = view.values.get(y * SIDE + x) {
-            ui.label(format!("uv {:.3} {:.3}: {value:.4}{unit}", part.x, part.y));
+        Some((part, *view.values.get(y * SIDE + x)?))
+    });
+    if channel == Channel::Source {
+        if let Some((part, value)) = hovered {
+            let name = sources::name(world, Source(value as u16));
+            ui.label(format!("uv {:.3} {:.3}: {name}", part.x, part.y));
         }
+        sources::legend(ui, world);
+        return;
+    }
+    let unit = if channel.is_part() { "" } else { " mm" };
+    ui.small(format!("white is {most:.3}{unit}"));
+    if let Some((part, value)) = hovered {
+        ui.label(format!("uv {:.3} {:.3}: {value:.4}{unit}", part.x, part.y));
     }
 }
 

@@ -15,91 +15,13 @@ pub fn plugin(app: &mut App) {
     app.add_panel(Place::Side, "Materials", show);
 }
 
-/// Stones and the like by name. Sorptivities are those of [`PorousMaterial::sorptivity`].
-fn presets() -> [(&'static str, PorousMaterial); 8] {
-    let pores = |alpha_poro: f32, s_p: f32| {
-        WettingModel::HnatLeknerDorf(Pores { alpha_poro, s_p, ..default() }, Coated::default())
-    };
-    let solid = PorousMaterial::default();
-    [
-        ("terracotta", solid),
-        ("brick", PorousMaterial { capacity_mm: 2.0, pore_volume: 0.3, model: pores(0.6, 0.02), ..solid }),
-        (
-            "sandstone",
-            PorousMaterial {
-                capacity_mm: 1.5,
-                sorptivity: 0.8,
-                pore_volume: 0.2,
-                model: pores(0.5, 0.03),
-                efflorescence: 0.3,
-                ..solid
-            },
-        ),
-        (
-            "concrete",
-            PorousMaterial {
-                capacity_mm: 0.6,
-                sorptivity: 0.15,
-                pore_volume: 0.12,
-                retained_mm: 0.15,
-                model: pores(0.4, 0.05),
-                tide_mark: 0.4,
-                ..solid
-            },
-        ),
-        (
-            "asphalt",
-            PorousMaterial {
-                capacity_mm: 0.2,
-                sorptivity: 0.02,
-                pore_volume: 0.06,
-                retained_mm: 0.2,
-                model: WettingModel::LeknerDorf(Coated { porosity: 0.9, n_solid: 1.6 }),
-                ..solid
-            },
-        ),
-        (
-            "sand",
-            PorousMaterial {
-                capacity_mm: 5.0,
-                sorptivity: 4.0,
-                pore_volume: 0.4,
-                retained_mm: 0.2,
-                model: WettingModel::Twomey(Grains::default()),
-                ..solid
-            },
-        ),
-        (
-            "cloth",
-            PorousMaterial {
-                capacity_mm: 0.3,
-                sorptivity: 3.0,
-                pore_volume: 0.6,
-                wet_translucency: 0.4,
-                model: pores(0.8, 0.05),
-                ..solid
-            },
-        ),
-        (
-            "glazed",
-            PorousMaterial {
-                capacity_mm: 0.0,
-                sorptivity: 0.0,
-                retained_mm: 0.03,
-                model: WettingModel::LeknerDorf(Coated { porosity: 0.0, n_solid: 1.5 }),
-                ..solid
-            },
-        ),
-    ]
-}
-
 fn show(ui: &mut egui::Ui, world: &mut World) {
     choose_surface(ui, world);
     let Some(surface) = world.resource::<Selected>().0 else { return };
     let before = world.get::<PorousMaterial>(surface).copied().unwrap_or_default();
     let mut material = before;
     ui.horizontal_wrapped(|ui| {
-        for (name, preset) in presets() {
+        for (name, preset) in PorousMaterial::PRESETS {
             if ui.selectable_label(material == preset, name).clicked() {
                 material = preset;
             }
@@ -109,15 +31,19 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     show_pores(ui, &mut material);
     ui.heading("Look");
     show_model(ui, &mut material);
-    if material != before {
-        world.entity_mut(surface).insert(material);
+    if material != before
+        && let Ok(mut entity) = world.get_entity_mut(surface)
+    {
+        entity.insert(material);
     }
     let before = world.get::<StandingWater>(surface).copied().unwrap_or_default();
     let mut water = before;
     ui.heading("Water that stands");
     show_standing(ui, &mut water);
-    if water != before {
-        world.entity_mut(surface).insert(water);
+    if water != before
+        && let Ok(mut entity) = world.get_entity_mut(surface)
+    {
+        entity.insert(water);
     }
 }
 
@@ -284,19 +210,5 @@ fn show_standing(ui: &mut egui::Ui, water: &mut StandingWater) {
     for (value, symbol) in water.absorption_per_mm.iter_mut().zip(["red, 1/mm", "green, 1/mm", "blue, 1/mm"])
     {
         parameter(ui, symbol, "absorption_per_mm", value, Some(1.0), "What murky water takes away");
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn presets_are_valid_and_differ() {
-        let presets = presets();
-        for (index, (name, preset)) in presets.iter().enumerate() {
-            assert_eq!(preset.validate(), Ok(()), "{name}");
-            assert!(presets[..index].iter().all(|(_, other)| other != preset), "{name} is another's double");
-        }
     }
 }

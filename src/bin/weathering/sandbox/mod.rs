@@ -2,10 +2,12 @@
 //!
 //! Each file is a plugin of its own; those that have something to show add a panel to [`ui`].
 
+mod boxes;
 mod brush;
 mod camera;
 mod effects;
 mod emitters;
+mod heat;
 mod hose;
 mod keys;
 mod maps;
@@ -19,7 +21,9 @@ mod saving;
 mod scenes;
 mod selection;
 mod settings;
+mod shades;
 mod shots;
+mod sources;
 mod split;
 mod theme;
 mod title;
@@ -38,8 +42,9 @@ use bevy::render::renderer::RenderAdapterInfo;
 use bevy::window::PrimaryWindow;
 use bevy_weathering::WeatheringPlugins;
 use bevy_weathering::effect::{EffectTable, WeatherEffect};
+use bevy_weathering::emitter::TrackSources;
 use bevy_weathering::overlay::SplatBudget;
-use bevy_weathering::overload::{LiveBudget, LiveBudgetPlugin};
+use bevy_weathering::overload::{LiveBudget, LiveBudgetPlugin, StageTimesPlugin};
 use bevy_weathering::replay::{require_adapter, task_pools};
 use bevy_weathering::scenario::{AssetTree, ScenarioPlugin};
 
@@ -68,9 +73,10 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
             }),
     )
     .add_plugins(WeatheringPlugins)
-    // As long as the pace lets ticks take; what is left to do here is fewer particles.
-    .insert_resource(LiveBudget { frame_ms: pace::BUDGET as f32 * 1000.0, ..default() })
-    .add_plugins(LiveBudgetPlugin)
+    .insert_resource(LiveBudget { frame_ms: pace::BUDGET_MS, ..default() })
+    .add_plugins((LiveBudgetPlugin, StageTimesPlugin))
+    // For the probe and the views.
+    .init_resource::<TrackSources>()
     .insert_resource(AssetTree(loaded.tree.clone()))
     .add_plugins(scenario);
     let is_model = model::is_model(&arguments.file);
@@ -127,7 +133,7 @@ fn spare_software_renderers(
         *is_small = true;
         commands.insert_resource(DirectionalLightShadowMap { size: 1024 });
         // A splat takes such a driver some 50 µs (benches/NOTES.md, `overlap`); the others wait.
-        commands.insert_resource(SplatBudget { per_frame: 1000, ..default() });
+        commands.insert_resource(SplatBudget { per_frame: 4000, ..default() });
         for mut window in &mut windows {
             window.resolution.set(960.0, 540.0);
         }

@@ -11,6 +11,8 @@ use bevy_weathering::scenario::{
 };
 use bevy_weathering::scenes::gltf_mesh::read_meshes;
 
+use super::shades::Cover;
+
 /// Texels of a map per metre of the mesh's size, before they are rounded.
 const TEXELS_PER_METRE: f32 = 256.0;
 
@@ -95,7 +97,10 @@ fn weather_meshes(
     meshes: Res<Assets<Mesh>>,
     models: Query<(), With<Model>>,
     parents: Query<&ChildOf>,
-    shown: Query<(Entity, &Mesh3d), (With<MeshMaterial3d<StandardMaterial>>, Without<Weatherable>)>,
+    shown: Query<
+        (Entity, &Mesh3d),
+        (With<MeshMaterial3d<StandardMaterial>>, Without<Weatherable>, Without<Cover>),
+    >,
     transforms: Query<&GlobalTransform>,
     mut refused: Local<Vec<AssetId<Mesh>>>,
 ) {

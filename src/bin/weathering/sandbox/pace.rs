@@ -1,14 +1,12 @@
 //! Time: pause, one tick, speed, and the time that is shown.
 //!
-//! A frame may spend only so long on ticks. What takes longer at the speed that was asked for goes slower, and says so; the
-//! window answers all the same.
+//! The speed is Bevy's, of virtual time. That a frame may spend only so long on ticks, and what becomes of speeds that would take
+//! longer, is the library's [`LiveBudget`](bevy_weathering::overload::LiveBudget); here it is only told.
 
-use std::time::Instant;
-
-use bevy::app::{RunFixedMainLoop, RunFixedMainLoopSystems};
 use bevy::prelude::*;
 use bevy_egui::egui;
 use bevy_weathering::clock::{ShownTime, WeatheringClock};
+use bevy_weathering::overload::LiveLoad;
 use bevy_weathering::scenario::{ScenarioStatus, reset_scenario};
 use bevy_weathering::schedule::WeatheringTick;
 
@@ -17,69 +15,36 @@ use super::ui::{AddPanel, Note, Place, keyboard_is_free};
 
 /// Slowest and fastest.
 const SPEEDS: (f64, f64) = (0.1, 100.0);
-/// Seconds of ticks in a frame.
-pub const BUDGET: f64 = 0.1;
-/// What virtual time follows of a frame, at most, seconds; Bevy's default.
-const LONGEST_FRAME: f64 = 0.25;
-
-/// How fast weather goes by.
-#[derive(Resource)]
-pub struct Pace {
-    /// Times as fast as in the world.
-    wanted: f64,
-    /// It goes slower than wanted.
-    held_back: bool,
-    /// Seconds that a tick takes, of late.
-    pub tick_seconds: f64,
-    begun: Option<(Instant, u32)>,
-}
-
-impl Default for Pace {
-    fn default() -> Self {
-        Self { wanted: 1.0, held_back: false, tick_seconds: 0.0, begun: None }
-    }
-}
-
-/// The fastest that ticks of this cost may go by, if one stands for `tick` seconds of weather and a frame takes `frame`: at
-/// least one tick a frame. Seconds, all of them.
-fn fastest(cost: f64, tick: f64, frame: f64) -> f64 {
-    let ticks = (BUDGET / cost.max(1e-9)).max(1.0);
-    ticks * tick / frame.clamp(1e-3, LONGEST_FRAME)
-}
+/// Milliseconds of ticks in a frame.
+pub const BUDGET_MS: f32 = 100.0;
+/// Below this part of the speed that was asked for, it is told.
+const HELD_BACK: f32 = 0.95;
 
 pub fn plugin(app: &mut App) {
-    app.init_resource::<Pace>()
-        .add_systems(
-            RunFixedMainLoop,
-            (
-                begin.in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop),
-                keep_pace.in_set(RunFixedMainLoopSystems::AfterFixedMainLoop),
-            ),
-        )
-        .add_systems(Update, (pause, step).run_if(keyboard_is_free))
-        .add_panel(Place::Bar, "time", show);
+    app.add_systems(Update, (pause, step, hurry).run_if(keyboard_is_free)).add_panel(
+        Place::Bar,
+        "time",
+        show,
+    );
 }
 
-fn begin(clock: Res<WeatheringClock>, mut pace: ResMut<Pace>) {
-    pace.begun = Some((Instant::now(), clock.tick()));
-}
-
-fn keep_pace(
-    clock: Res<WeatheringClock>,
-    real: Res<Time<Real>>,
-    mut pace: ResMut<Pace>,
-    mut time: ResMut<Time<Virtual>>,
-) {
-    let Some((begun, first)) = pace.begun.take() else { return };
-    let ticks = clock.tick().saturating_sub(first);
-    if ticks > 0 {
-        let cost = begun.elapsed().as_secs_f64() / f64::from(ticks);
-        // One slow tick is no reason, the second is.
-        pace.tick_seconds += (cost - pace.tick_seconds) * 0.3;
+/// Twice or half as fast, within [`SPEEDS`].
+fn hurry(keys: Res<ButtonInput<KeyCode>>, mut time: ResMut<Time<Virtual>>, mut note: ResMut<Note>) {
+    let pressed = |key| i32::from(keys.just_pressed(key));
+    let steps = pressed(KeyCode::Period) - pressed(KeyCode::Comma);
+    if steps != 0 {
+        let speed = stepped(time.relative_speed_f64(), steps);
+        time.set_relative_speed_f64(speed);
+        note.tell(format!("{speed:.2} times as fast as in the world"));
     }
-    let most = fastest(pace.tick_seconds, f64::from(clock.delta_secs()), real.delta_secs_f64());
-    pace.held_back = most < pace.wanted;
-    time.set_relative_speed_f64(pace.wanted.min(most));
+}
+
+/// A speed so many doublings faster.
+fn stepped(speed: f64, doublings: i32) -> f64 {
+    let faster = speed * 2f64.powi(doublings);
+    // Not past the speed of the world, nor beside it by what was rounded.
+    let faster = if (faster - 1.0).abs() < 0.05 { 1.0 } else { faster };
+    faster.clamp(SPEEDS.0, SPEEDS.1)
 }
 
 fn pause(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
@@ -140,13 +105,19 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     if ui.button("Start over").on_hover_text("Dry, at the first tick (R)").clicked() {
         start_over(world);
     }
-    let mut pace = world.resource_mut::<Pace>();
-    let speed = egui::Slider::new(&mut pace.wanted, SPEEDS.0..=SPEEDS.1).logarithmic(true).suffix(" x");
-    ui.add(speed).on_hover_text("How many times faster weather goes by than in the world");
-    if pace.held_back && !is_paused {
-        let reached = world.resource::<Time<Virtual>>().relative_speed_f64();
-        let text = egui::RichText::new(format!("held at {reached:.2} x")).color(theme::WARNING);
-        ui.label(text).on_hover_text("Ticks take longer than a frame has for them");
+    let mut speed = world.resource::<Time<Virtual>>().relative_speed_f64();
+    let slider = egui::Slider::new(&mut speed, SPEEDS.0..=SPEEDS.1).logarithmic(true).suffix(" x");
+    // Decimals that are cut off would count as changes.
+    let slider = ui.add(slider.custom_formatter(|speed, _| format!("{speed:.2}")));
+    let about = "How many times faster weather goes by than in the world (, and .)";
+    if slider.on_hover_text(about).changed() {
+        world.resource_mut::<Time<Virtual>>().set_relative_speed_f64(speed.clamp(SPEEDS.0, SPEEDS.1));
+    }
+    let part = world.resource::<LiveLoad>().speed;
+    if part < HELD_BACK && !is_paused {
+        let text = format!("held at {:.2} x", speed * f64::from(part));
+        let text = egui::RichText::new(text).color(theme::WARNING);
+        ui.label(text).on_hover_text("Ticks, or drawing, take longer than there is time for");
     }
     show_time(ui, world);
 }
@@ -179,16 +150,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_dear_goes_slower_but_never_stops() {
-        // 60 ticks a second, 60 frames a second: a tick of a millisecond may run a hundred times a frame.
-        let speed = |cost: f64, frame: f64| fastest(cost, 1.0 / 60.0, frame);
-        assert!((speed(1e-3, 1.0 / 60.0) - 100.0).abs() < 1e-6);
-        assert!((speed(0.05, 1.0 / 60.0) - 2.0).abs() < 1e-6);
-        // A tick that takes ten seconds: one a frame.
-        assert!((speed(10.0, LONGEST_FRAME) * LONGEST_FRAME - 1.0 / 60.0).abs() < 1e-9);
-        for (cost, frame) in [(0.0, 0.0), (0.0, 1e9), (1e9, 0.0)] {
-            let speed = speed(cost, frame);
-            assert!(speed.is_finite() && speed > 0.0, "{cost} {frame}: {speed}");
-        }
+    fn steps_of_speed_stay_in_range_and_come_back_to_the_worlds() {
+        assert_eq!((stepped(1.0, 1), stepped(1.0, -1)), (2.0, 0.5));
+        let down = (0..20).fold(1.0, |speed, _| stepped(speed, -1));
+        assert_eq!(down, SPEEDS.0);
+        let up = (0..20).fold(down, |speed, _| stepped(speed, 1));
+        assert_eq!(up, SPEEDS.1);
+        // 0.1, 0.2, 0.4, 0.8, 1.6, ... and 1.04, 0.52.
+        assert_eq!(stepped(0.52, 1), 1.0);
+        assert_eq!(stepped(2.0, -1), 1.0);
     }
 }

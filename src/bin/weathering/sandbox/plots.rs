@@ -1,15 +1,19 @@
-//! What happens, over time: frames and ticks, particles and hits, and where the water is.
+//! What happens, over time: frames and ticks and what in them takes the time, particles and hits, and where the water is.
 
 use std::collections::VecDeque;
 use std::time::Instant;
 
+use bevy::diagnostic::DiagnosticsStore;
 use bevy::prelude::*;
+use bevy::render::diagnostic::RenderDiagnosticsPlugin;
 use bevy_egui::egui;
+use bevy_weathering::overlay::SplatStats;
+use bevy_weathering::overload::{STAGES, StageMark, StageMeans, StageTimes};
 use bevy_weathering::particle::{ParticleCounts, WaterCounts};
 use bevy_weathering::wetting::{SurfaceWater, WettingStats};
 use egui_plot::{Legend, Line, Plot, PlotPoints};
 
-use super::pace::Pace;
+use super::settings::Settings;
 use super::ui::{AddPanel, Place};
 
 /// Seconds between two samples.
@@ -17,11 +21,23 @@ const EVERY: f64 = 0.1;
 /// Samples that are kept: a minute.
 const KEPT: usize = 600;
 
+/// The narrowest chart that can be read, points.
+const NARROWEST: f32 = 210.0;
+/// A measurement of the GPU that is older than this, in seconds, is of something that is over.
+const STALE: f32 = 1.0;
+
 /// What is measured; each is a line.
-const LINES: [(&str, Chart); 11] = [
+const LINES: [(&str, Chart); 18] = [
     ("frame, ms", Chart::Time),
     ("tick, ms", Chart::Time),
     ("ticks a frame", Chart::Time),
+    ("emit", Chart::Stages),
+    ("move", Chart::Stages),
+    ("collide", Chart::Stages),
+    ("deposit", Chart::Stages),
+    ("water and matter", Chart::Stages),
+    ("rest of the frame", Chart::Stages),
+    ("splats, on the GPU", Chart::Stages),
     ("in flight", Chart::Particles),
     ("hits/s", Chart::Particles),
     ("tiles that run/s", Chart::Particles),
@@ -36,9 +52,19 @@ const LINES: [(&str, Chart); 11] = [
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Chart {
     Time,
+    /// Parts of a frame, ms.
+    Stages,
     Particles,
     Water,
 }
+
+/// Charts with their titles, in the order in which they are shown.
+const CHARTS: [(Chart, &str); 4] = [
+    (Chart::Time, "time"),
+    (Chart::Stages, "ms a frame"),
+    (Chart::Particles, "particles"),
+    (Chart::Water, "water"),
+];
 
 /// The samples of the last minute.
 #[derive(Resource)]
@@ -50,6 +76,8 @@ struct History {
     /// Counters at the last sample.
     hits: u64,
     tiles: u64,
+    /// Stages of ticks at the last sample.
+    stages: Option<StageMark>,
 }
 
 /// Frames since the last sample.
@@ -67,6 +95,7 @@ impl Default for History {
             frames: Frames::default(),
             hits: 0,
             tiles: 0,
+            stages: None,
         }
     }
 }
@@ -86,7 +115,12 @@ impl History {
 }
 
 pub fn plugin(app: &mut App) {
-    app.init_resource::<History>().add_systems(Last, measure).add_panel(Place::Plots, "plots", show);
+    // Measures passes on the GPU, where it has timestamps.
+    app.add_plugins(RenderDiagnosticsPlugin).init_resource::<History>().add_systems(Last, measure).add_panel(
+        Place::Plots,
+        "plots",
+        show,
+    );
 }
 
 /// Came, is there, evaporated, dripped or ran off; ml. As far as it is booked: what evaporates at rest is booked later.
@@ -101,12 +135,32 @@ fn budget(surfaces: &Query<&SurfaceWater>) -> [f64; 4] {
     })
 }
 
+/// Of a mean frame that takes `frame_ms`: emit, move, collide, deposit, water and matter, and the rest of it; ms. `ticks`: of
+/// that frame.
+fn parts_of_a_frame(means: Option<StageMeans>, ticks: f64, frame_ms: f64) -> [f64; 6] {
+    let of = |stage: &str| {
+        let index = STAGES.iter().position(|known| *known == stage);
+        index.zip(means).map_or(0.0, |(index, means)| means.stages_ms[index] * ticks)
+    };
+    let stages = ["emit", "integrate", "trace", "deposit", "flow"].map(of);
+    let [emit, integrate, trace, deposit, flow] = stages;
+    let rest = (frame_ms - stages.iter().sum::<f64>()).max(0.0);
+    [emit, integrate, trace, deposit, flow, rest]
+}
+
+/// What the pass that paints splats took on the GPU of late, ms; 0 where it is not known, or has nothing to do.
+fn splats_ms(diagnostics: &DiagnosticsStore) -> f64 {
+    let last = diagnostics.get(&SplatStats::GPU_TIME).and_then(|told| told.measurement());
+    last.filter(|last| last.time.elapsed().as_secs_f32() < STALE).map_or(0.0, |last| last.value)
+}
+
 fn measure(
     clock: Res<bevy_weathering::clock::WeatheringClock>,
     counts: Res<ParticleCounts>,
     water: Res<WaterCounts>,
     stats: Res<WettingStats>,
-    pace: Res<Pace>,
+    times: Res<StageTimes>,
+    diagnostics: Res<DiagnosticsStore>,
     surfaces: Query<&SurfaceWater>,
     mut history: ResMut<History>,
 ) {
@@ -123,10 +177,21 @@ fn measure(
     let hits = counts.hit.saturating_sub(history.hits) as f64;
     let tiles = stats.tiles_run().saturating_sub(history.tiles) as f64;
     let [came, there, dried, left] = budget(&surfaces);
+    let means = history.stages.as_mut().and_then(|mark| times.take_since(mark));
+    history.stages.get_or_insert_with(|| times.mark());
+    let frame_ms = since / frames * 1e3;
+    let [emit, moved, collide, deposit, flow, rest] = parts_of_a_frame(means, ticks / frames, frame_ms);
     let values = [
-        since / frames * 1e3,
-        pace.tick_seconds * 1e3,
+        frame_ms,
+        means.map_or(0.0, |means| means.stages_ms.iter().sum()),
         ticks / frames,
+        emit,
+        moved,
+        collide,
+        deposit,
+        flow,
+        rest,
+        splats_ms(&diagnostics),
         counts.alive as f64,
         hits / since,
         tiles / since,
@@ -142,14 +207,25 @@ fn measure(
 }
 
 fn show(ui: &mut egui::Ui, world: &mut World) {
+    let mut shown = world.resource::<Settings>().charts;
+    ui.horizontal(|ui| {
+        for (index, (_, name)) in CHARTS.into_iter().enumerate() {
+            ui.toggle_value(&mut shown[index], name);
+        }
+    });
+    if world.resource::<Settings>().charts != shown {
+        world.resource_mut::<Settings>().charts = shown;
+    }
+    let mut charts: Vec<_> = CHARTS.into_iter().zip(shown).filter(|(_, is_shown)| *is_shown).collect();
+    // Better fewer than none that can be read.
+    charts.truncate(((ui.available_width() / NARROWEST) as usize).max(1));
+    if charts.is_empty() {
+        return;
+    }
     let history = world.resource::<History>();
     let height = ui.available_height();
-    ui.columns(3, |columns| {
-        for (column, (chart, name)) in columns.iter_mut().zip([
-            (Chart::Time, "time"),
-            (Chart::Particles, "particles"),
-            (Chart::Water, "water"),
-        ]) {
+    ui.columns(charts.len(), |columns| {
+        for (column, ((chart, name), _)) in columns.iter_mut().zip(charts) {
             let plot = Plot::new(name)
                 .height(height)
                 .legend(Legend::default())
@@ -179,5 +255,21 @@ mod tests {
         assert_eq!(history.samples.len(), KEPT);
         assert_eq!(history.samples.front().map(|(at, _)| *at), Some(50.0));
         assert_eq!(history.line(0).points().len(), KEPT);
+    }
+
+    #[test]
+    fn parts_of_a_frame_are_the_frame() {
+        let stages_ms = [9.0, 1.0, 2.0, 3.0, 4.0, 5.0, 9.0];
+        let means = StageMeans { ticks: 6, stages_ms, outside_ms: 1.0 };
+        // Two ticks a frame, 50 ms.
+        assert_eq!(parts_of_a_frame(Some(means), 2.0, 50.0), [2.0, 4.0, 6.0, 8.0, 10.0, 20.0]);
+        assert_eq!(parts_of_a_frame(None, 0.0, 50.0), [0.0, 0.0, 0.0, 0.0, 0.0, 50.0]);
+        // What was measured a moment apart may be more.
+        assert_eq!(parts_of_a_frame(Some(means), 2.0, 10.0)[5], 0.0);
+    }
+
+    #[test]
+    fn every_chart_has_lines() {
+        assert!(CHARTS.iter().all(|(chart, _)| LINES.iter().any(|(_, of)| of == chart)));
     }
 }

@@ -1,4 +1,4 @@
-//! Asking a place how wet it is, and since when.
+//! Asking a place how wet it is, since when, and from which emitter.
 
 use bevy::prelude::*;
 use bevy_egui::egui;
@@ -6,11 +6,12 @@ use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::collision::{CollisionScene, SceneHit};
 use bevy_weathering::matter::SurfaceMatter;
 use bevy_weathering::overlay::{Splat, Weatherable};
-use bevy_weathering::wetting::{SurfaceWater, WetGeometry, Wetness, WetnessQuery};
+use bevy_weathering::wetting::{Origin, SurfaceWater, WetGeometry, Wetness, WetnessQuery};
 
 use super::hose::Pointed;
 use super::selection::{Selected, name_of};
 use super::settings::{Settings, Tool};
+use super::sources;
 use super::ui::{AddPanel, Place};
 
 /// The farthest place that can be asked, metres.
@@ -30,7 +31,9 @@ struct Texel {
     /// Column and row.
     at: [u32; 2],
     /// Seconds since its water was last moved.
-    since: Option<f64>,
+    moved: Option<f64>,
+    /// If it is wet and that is known: where its water came from, and seconds since it was dry.
+    origin: Option<(Origin, Option<f64>)>,
     /// Dust, mud and snow, mm.
     matter_mm: [f64; 3],
 }
@@ -85,12 +88,16 @@ fn read(
         }
         let texel = geometry.0.stand_in(texel).unwrap_or(texel);
         let tick = water.texels().get(texel as usize).map_or(0, |state| state.tick);
-        let ticks = clock.tick().saturating_sub(tick);
-        let since = (tick > 0).then(|| f64::from(ticks) / f64::from(clock.hz()));
+        let ago = |tick: u32| f64::from(clock.tick().saturating_sub(tick)) / f64::from(clock.hz());
+        let since = |tick: u32| (tick > 0).then(|| ago(tick));
+        let moved = since(tick);
+        let wetness = wetness.at_uv(hit.surface, hit.uv)?;
+        let is_wet = wetness.film_mm + wetness.absorbed_mm > 0.0;
+        let origin = water.origin(texel).filter(|_| is_wet).map(|origin| (origin, since(origin.since)));
         let unit_mm = geometry.0.unit_mm(water.units(), texel);
         let held = matter.and_then(|matter| matter.texels().get(texel as usize)).copied().unwrap_or_default();
         let matter_mm = [held.dust, held.mud, held.snow].map(|units| f64::from(units) * unit_mm);
-        Some(Texel { wetness: wetness.at_uv(hit.surface, hit.uv)?, at, since, matter_mm })
+        Some(Texel { wetness, at, moved, origin, matter_mm })
     });
 }
 
@@ -105,6 +112,7 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
         ui.label("The place has gone.");
         return;
     };
+    let source = texel.origin.map(|(origin, _)| sources::name(world, origin.source));
     egui::Grid::new("probe").num_columns(2).striped(true).show(ui, |ui| {
         let mut row = |label: &str, value: String| {
             ui.label(label);
@@ -120,9 +128,12 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
         row("film", format!("{film_mm:.4} mm"));
         row("absorbed", format!("{absorbed_mm:.4} mm"));
         row("pores full", format!("{:.0} %", saturation * 100.0));
-        let since =
-            texel.since.map_or_else(|| "never wet".to_owned(), |seconds| format!("{seconds:.1} s ago"));
-        row("last moved", since);
+        let ago = |seconds: f64| format!("{seconds:.1} s ago");
+        row("last moved", texel.moved.map_or_else(|| "never wet".to_owned(), ago));
+        if let (Some((_, since)), Some(source)) = (texel.origin, source) {
+            row("wet since", since.map_or_else(|| "longer than is known".to_owned(), ago));
+            row("water from", source);
+        }
         let [dust, mud, snow] = texel.matter_mm;
         row("dust", format!("{dust:.4} mm"));
         row("mud", format!("{mud:.4} mm"));

@@ -11,7 +11,7 @@ use bevy::render::gpu_readback::{Readback, ReadbackComplete};
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use bevy_egui::egui;
 use bevy_weathering::clock::ShownTime;
-use bevy_weathering::overlay::{Overlays, SplatQueue};
+use bevy_weathering::overlay::{Overlays, SplatQueue, SplatStats};
 use bevy_weathering::particle::Particles;
 use bevy_weathering::replay::without_padding;
 use bevy_weathering::save::{ColorMaps, SaveError, SavedScene};
@@ -189,7 +189,9 @@ fn advance(world: &mut World) {
         }
         Step::Settling { folder, frames } => {
             let mut queues = world.query::<&SplatQueue>();
-            let waits = queues.iter(world).any(|queue| !queue.is_empty());
+            // On their way, or beyond the budgets of the frames so far.
+            let waits = queues.iter(world).any(|queue| !queue.is_empty())
+                || world.resource::<SplatStats>().pending() > 0;
             Some(Step::Settling { folder, frames: if waits { SETTLE } else { frames - 1 } })
         }
         Step::Reading { folder, maps } if maps.iter().flatten().all(Option::is_some) => {

@@ -25,6 +25,8 @@ pub struct Settings {
     pub maps: bool,
     /// The plots are shown.
     pub plots: bool,
+    /// Which of the plots.
+    pub charts: [bool; 4],
     /// Title of the open panel.
     pub panel: String,
     /// What the left mouse button does.
@@ -111,6 +113,8 @@ impl Default for HoseSettings {
 pub struct DebugViews {
     /// Boxes of the surfaces' BVHs.
     pub boxes: bool,
+    /// How far below the outermost box.
+    pub level: u32,
     /// Edges at which uvs break.
     pub seams: bool,
     /// Emitters, and where they point.
@@ -119,6 +123,37 @@ pub struct DebugViews {
     pub wind: bool,
     /// How many particles are where.
     pub particles: bool,
+    /// What surfaces hold.
+    pub shade: Shade,
+}
+
+/// What of their water surfaces show in false colours.
+#[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Shade {
+    /// Nothing: they look as they look.
+    #[default]
+    Off,
+    /// How wet it looks.
+    Wetness,
+    /// Film.
+    Film,
+    /// Part of the pores that is full.
+    Saturation,
+    /// Which emitter it came from.
+    Source,
+}
+
+impl Shade {
+    /// The one after it; after the last the first.
+    pub fn following(self) -> Self {
+        match self {
+            Self::Off => Self::Wetness,
+            Self::Wetness => Self::Film,
+            Self::Film => Self::Saturation,
+            Self::Saturation => Self::Source,
+            Self::Source => Self::Off,
+        }
+    }
 }
 
 impl Default for Settings {
@@ -128,6 +163,7 @@ impl Default for Settings {
             panels: true,
             maps: false,
             plots: false,
+            charts: [true; 4],
             panel: "Scenes".into(),
             tool: Tool::default(),
             hose: HoseSettings::default(),
@@ -155,6 +191,7 @@ impl Settings {
         let [radius, strength] = BrushSettings::RANGES;
         brush.radius = within(brush.radius, radius, default.radius);
         brush.strength = within(brush.strength, strength, default.strength);
+        self.views.level = self.views.level.min(super::boxes::DEEPEST);
         self
     }
 
@@ -240,14 +277,16 @@ mod tests {
             panel: "Weather".into(),
             tool: Tool::Probe,
             hose: HoseSettings { effect: "mud".into(), litres_per_minute: 3.0, ..default() },
-            views: DebugViews { seams: true, ..default() },
+            views: DebugViews { seams: true, level: 3, shade: Shade::Source, ..default() },
             ..default()
         };
         settings.write(&file);
         assert_eq!(Settings::read(&file), settings);
-        std::fs::write(&file, "(zoom: NaN, hose: (rate: -5.0), of_a_later_version: 3)").unwrap();
+        std::fs::write(&file, "(zoom: NaN, hose: (rate: -5.0), views: (level: 99), of_a_later_version: 3)")
+            .unwrap();
         let repaired = Settings::read(&file);
         assert_eq!((repaired.zoom, repaired.hose.rate), (1.0, 1.0));
+        assert_eq!(repaired.views.level, super::super::boxes::DEEPEST);
         std::fs::write(&file, "(zoom: 1.0").unwrap();
         assert_eq!(Settings::read(&file), Settings::default());
     }

@@ -117,7 +117,8 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
         }
         let is_running = world.resource::<Sequence>().folder.is_some();
         let label = if is_running { "End the sequence" } else { "Begin a sequence" };
-        if ui.button(label).on_hover_text("Of every frame in which time goes on (F11)").clicked() {
+        let about = "Of every frame in which time goes on; panels are hidden meanwhile, F11 ends it";
+        if ui.button(label).on_hover_text(about).clicked() {
             toggle_sequence(world);
         }
     });

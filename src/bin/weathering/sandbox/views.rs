@@ -1,23 +1,24 @@
-//! What is drawn over the scene: boxes of BVHs, seams of uvs, emitters, the wind, where particles are, and the probe.
+//! What is drawn over the scene: seams of uvs, emitters, the wind and the probe; and the panel for these and for what has a file
+//! of its own ([`shades`], [`boxes`], [`heat`]).
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use bevy::math::bounding::Aabb3d;
 use bevy::prelude::*;
+use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use bevy_egui::egui;
 use bevy_weathering::collision::{CollisionScene, MeshBvh, MeshTriangles, SurfaceCollider};
 use bevy_weathering::emitter::{Emitter, EmitterShape};
-use bevy_weathering::particle::Particles;
 use bevy_weathering::weather::Weather;
 
 use super::probe::Probed;
 use super::selection::Selected;
 use super::settings::{Settings, Tool};
 use super::ui::{AddPanel, Place};
+use super::{boxes, heat, shades};
 
-/// Cells of the particle count along the longest side of the scene.
-const CELLS: f32 = 14.0;
+/// The most edges that are drawn.
+const MOST_EDGES: usize = 20_000;
 
 /// Edges at which uvs break, of the selected surface.
 #[derive(Resource, Default)]
@@ -25,45 +26,37 @@ struct Seams {
     of: Option<Arc<MeshBvh>>,
     /// In the space of the mesh.
     edges: Vec<[Vec3; 2]>,
+    /// They are being looked for: a large mesh takes seconds.
+    task: Option<Task<Vec<[Vec3; 2]>>>,
 }
 
 pub fn plugin(app: &mut App) {
-    app.init_resource::<Seams>()
-        .add_systems(Update, (draw_boxes, draw_seams, draw_emitters, draw_wind, draw_particles, draw_probe))
+    app.add_plugins((shades::plugin, boxes::plugin, heat::plugin))
+        .init_resource::<Seams>()
+        .add_systems(Update, (draw_seams, draw_emitters, draw_wind, draw_probe))
         .add_panel(Place::Side, "Views", show);
 }
 
 fn show(ui: &mut egui::Ui, world: &mut World) {
-    let edges = world.resource::<Seams>().edges.len();
+    shades::show(ui, world);
+    ui.heading("Over the scene");
+    boxes::show(ui, world);
+    heat::show(ui, world);
+    let seams = world.resource::<Seams>();
+    let (edges, is_looking) = (seams.edges.len(), seams.task.is_some());
     let mut settings = world.resource_mut::<Settings>();
     let views = &mut settings.views;
-    ui.checkbox(&mut views.boxes, "boxes").on_hover_text("Around each surface, and around all of them");
     ui.checkbox(&mut views.seams, "uv seams").on_hover_text("Where the uvs of the selected surface break");
     if views.seams {
-        ui.small(format!("{edges} edges"));
+        let text = match (is_looking, edges > MOST_EDGES) {
+            (true, _) => "being looked for".to_owned(),
+            (false, false) => format!("{edges} edges"),
+            (false, true) => format!("{edges} edges, of which {MOST_EDGES} are drawn"),
+        };
+        ui.small(text);
     }
     ui.checkbox(&mut views.emitters, "emitters").on_hover_text("Where they are and which way they point");
     ui.checkbox(&mut views.wind, "wind").on_hover_text("An arrow as long as it goes in a second");
-    ui.checkbox(&mut views.particles, "particle count").on_hover_text("From blue, few, to red, many");
-}
-
-fn draw_boxes(
-    settings: Res<Settings>,
-    scene: Res<CollisionScene>,
-    surfaces: Query<(&GlobalTransform, &SurfaceCollider)>,
-    mut gizmos: Gizmos,
-) {
-    if !settings.views.boxes || scene.is_empty() {
-        return;
-    }
-    for (transform, collider) in &surfaces {
-        let (min, max) = collider.0.bounds();
-        let bounds = Aabb3d { min: min.into(), max: max.into() };
-        gizmos.aabb_3d(bounds, *transform, Color::srgb(0.3, 0.9, 0.4));
-    }
-    let (min, max) = scene.bounds();
-    let bounds = Aabb3d { min: min.into(), max: max.into() };
-    gizmos.aabb_3d(bounds, Transform::IDENTITY, Color::srgb(0.9, 0.9, 0.3));
 }
 
 fn draw_seams(
@@ -80,10 +73,14 @@ fn draw_seams(
         return;
     };
     if !seams.of.as_ref().is_some_and(|of| Arc::ptr_eq(of, &collider.0)) {
-        seams.edges = find_seams(collider.0.triangles());
-        seams.of = Some(collider.0.clone());
+        let mesh = collider.0.clone();
+        let task = AsyncComputeTaskPool::get().spawn(async move { find_seams(mesh.triangles()) });
+        *seams = Seams { of: Some(collider.0.clone()), edges: Vec::new(), task: Some(task) };
     }
-    for edge in &seams.edges {
+    if let Some(edges) = seams.task.as_mut().and_then(check_ready) {
+        (seams.edges, seams.task) = (edges, None);
+    }
+    for edge in seams.edges.iter().take(MOST_EDGES) {
         let [start, end] = edge.map(|corner| transform.transform_point(corner));
         gizmos.line(start, end, Color::srgb(1.0, 0.35, 0.1));
     }
@@ -149,33 +146,6 @@ fn draw_wind(settings: Res<Settings>, weather: Res<Weather>, scene: Res<Collisio
     let (low, high) = scene.bounds();
     let start = ((low + high) * 0.5).with_y(high.y + 0.3);
     gizmos.arrow(start, start + weather.wind, Color::srgb(0.85, 0.6, 1.0));
-}
-
-fn draw_particles(
-    settings: Res<Settings>,
-    particles: Res<Particles>,
-    mut counts: Local<BTreeMap<[i32; 3], u32>>,
-    mut gizmos: Gizmos,
-) {
-    if !settings.views.particles || particles.is_empty() {
-        return;
-    }
-    let corners = particles.positions().iter();
-    let (low, high) = corners
-        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), place| (low.min(*place), high.max(*place)));
-    let cell = ((high - low).max_element() / CELLS).max(0.05);
-    counts.clear();
-    for place in particles.positions() {
-        let index = (*place / cell).floor().as_ivec3().to_array();
-        *counts.entry(index).or_default() += 1;
-    }
-    let most = counts.values().copied().max().unwrap_or(1).max(2);
-    for (index, count) in counts.iter() {
-        let middle = (IVec3::from_array(*index).as_vec3() + 0.5) * cell;
-        let part = (*count as f32).ln() / (most as f32).ln();
-        let color = Color::hsl(240.0 * (1.0 - part), 0.9, 0.55);
-        gizmos.cube(Transform::from_translation(middle).with_scale(Vec3::splat(cell * 0.95)), color);
-    }
 }
 
 fn draw_probe(settings: Res<Settings>, probed: Res<Probed>, mut gizmos: Gizmos) {

@@ -33,7 +33,7 @@ impl Default for Rain {
 }
 
 pub fn plugin(app: &mut App) {
-    app.init_resource::<Rain>().add_panel(Place::Side, "Weather", show);
+    app.init_resource::<Rain>().add_systems(Update, follow_scene).add_panel(Place::Side, "Weather", show);
 }
 
 fn show(ui: &mut egui::Ui, world: &mut World) {
@@ -151,6 +151,32 @@ fn show_rain(ui: &mut egui::Ui, world: &mut World) {
     world.spawn((Name::new("rain over the scene"), OwnRain, emitter, transform));
 }
 
+/// The rain falls on all of the scene, also when another is opened, or when it grows.
+fn follow_scene(
+    scene: Res<CollisionScene>,
+    split: Option<Res<Split>>,
+    mut clouds: Query<(&mut Emitter, &mut Transform), (With<OwnRain>, Without<CopyOf>)>,
+) {
+    if !scene.is_changed() || scene.is_empty() {
+        return;
+    }
+    let (low, high) = split::bounds(split.as_deref(), &scene);
+    let Some((half_size, place)) = above(low, high) else { return };
+    for (mut emitter, mut transform) in &mut clouds {
+        let EmitterShape::Sky { half_size: now } = emitter.shape else { continue };
+        if is_elsewhere((now, transform.translation), (half_size, place)) {
+            emitter.shape = EmitterShape::Sky { half_size };
+            transform.translation = place;
+        }
+    }
+}
+
+/// Whether a rectangle is another by more than one sees.
+fn is_elsewhere((size, place): (Vec2, Vec3), (other_size, other): (Vec2, Vec3)) -> bool {
+    let least = 0.02 * size.max_element();
+    (size - other_size).abs().max_element() > least || place.distance(other) > least
+}
+
 /// Half the size of a rectangle over a box, with some to spare, and where it is.
 fn above(low: Vec3, high: Vec3) -> Option<(Vec2, Vec3)> {
     let size = high - low;
@@ -183,5 +209,8 @@ mod tests {
         assert!(half_size.x > 2.0 && half_size.y > 1.0 && place.y > 2.0, "{half_size} {place}");
         assert_eq!((place.x, place.z), (1.0, 3.0));
         assert_eq!(above(Vec3::INFINITY, Vec3::NEG_INFINITY), None);
+        let here = (half_size, place);
+        assert!(!is_elsewhere(here, (half_size * 1.01, place + 0.01)));
+        assert!(is_elsewhere(here, (half_size * 2.0, place)) && is_elsewhere(here, (half_size, place + 1.0)));
     }
 }

@@ -1,0 +1,218 @@
+//! What surfaces hold, in false colours on them.
+//!
+//! Over each surface lies a cover: a child that shows the same mesh, without light, with a picture over the uvs of its maps. One
+//! surface a frame is read anew, the one that was read longest ago, and none more often than it is worth.
+//!
+//! Surfaces that are posed get none.
+
+use std::time::Instant;
+
+use bevy::asset::RenderAssetUsages;
+use bevy::camera::visibility::RenderLayers;
+use bevy::image::{ImageAddressMode, ImageSampler, ImageSamplerDescriptor};
+use bevy::light::NotShadowCaster;
+use bevy::mesh::UvChannel;
+use bevy::prelude::*;
+use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat};
+use bevy_egui::egui;
+use bevy_weathering::collision::{DeformingCollider, SurfaceCollider, UvSet};
+use bevy_weathering::overlay::{Weatherable, Wrap};
+use bevy_weathering::wetting::{SurfaceWater, WetGeometry, Wetness, WetnessQuery};
+
+use super::settings::{Settings, Shade};
+use super::{maps, sources};
+
+/// Samples along each side.
+const SIDE: u32 = 128;
+/// Seconds between two readings of a surface.
+const EVERY: f32 = 0.5;
+/// Film that is shown in white, mm.
+const MOST_FILM_MM: f32 = 0.5;
+/// How much of the surface the cover hides, 0..=255.
+const OPACITY: u8 = 225;
+/// So that it lies on its surface, and not in it.
+const DEPTH_BIAS: f32 = 8.0;
+
+/// A cover, on a child of its surface.
+#[derive(Component)]
+pub struct Cover {
+    image: Handle<Image>,
+    /// What was read into it, and when.
+    read: Option<(Shade, Instant)>,
+}
+
+pub fn plugin(app: &mut App) {
+    app.add_systems(Update, (lay, paint).chain());
+}
+
+/// What is shown, and what the colours stand for.
+pub fn show(ui: &mut egui::Ui, world: &mut World) {
+    ui.heading("On surfaces");
+    let mut shade = world.resource::<Settings>().views.shade;
+    ui.horizontal_wrapped(|ui| {
+        for (kind, name, about) in [
+            (Shade::Off, "their look", "As they look"),
+            (Shade::Wetness, "wetness", "How wet they look"),
+            (Shade::Film, "film", "Water that lies on them"),
+            (Shade::Saturation, "saturation", "Part of their pores that is full"),
+            (Shade::Source, "source", "Which emitter it was"),
+        ] {
+            ui.selectable_value(&mut shade, kind, name).on_hover_text(about);
+        }
+    });
+    if world.resource::<Settings>().views.shade != shade {
+        world.resource_mut::<Settings>().views.shade = shade;
+    }
+    match shade {
+        Shade::Off => {}
+        Shade::Wetness | Shade::Saturation => {
+            ui.small("black is none, white is all");
+        }
+        Shade::Film => {
+            ui.small(format!("black is none, white is {MOST_FILM_MM} mm or more"));
+        }
+        Shade::Source => sources::legend(ui, world),
+    }
+}
+
+type Coverable =
+    (Entity, &'static Weatherable, &'static Mesh3d, Option<&'static UvSet>, Option<&'static RenderLayers>);
+type AtRest = (With<SurfaceCollider>, Without<DeformingCollider>);
+
+/// Gives surfaces covers, and takes away those that are not wanted or do not fit any more.
+fn lay(
+    settings: Res<Settings>,
+    mut commands: Commands,
+    mut images: ResMut<Assets<Image>>,
+    mut materials: ResMut<Assets<StandardMaterial>>,
+    surfaces: Query<Coverable, AtRest>,
+    covers: Query<(Entity, &ChildOf, &Mesh3d), With<Cover>>,
+    mut covered: Local<Vec<Entity>>,
+) {
+    let is_on = settings.views.shade != Shade::Off;
+    covered.clear();
+    for (cover, surface, mesh) in &covers {
+        let surface = surface.parent();
+        if is_on && surfaces.get(surface).is_ok_and(|(_, _, shown, ..)| shown.id() == mesh.id()) {
+            covered.push(surface);
+        } else {
+            commands.entity(cover).try_despawn();
+        }
+    }
+    if !is_on {
+        return;
+    }
+    covered.sort_unstable();
+    for (surface, maps, mesh, uvs, layers) in &surfaces {
+        if covered.binary_search(&surface).is_ok() {
+            continue;
+        }
+        let image = images.add(picture(maps.wrap()));
+        let material = materials.add(StandardMaterial {
+            base_color_texture: Some(image.clone()),
+            base_color_channel: match uvs {
+                Some(UvSet::Second) => UvChannel::Uv1,
+                _ => UvChannel::Uv0,
+            },
+            unlit: true,
+            alpha_mode: AlphaMode::Blend,
+            cull_mode: None,
+            depth_bias: DEPTH_BIAS,
+            ..default()
+        });
+        let mut cover = commands.spawn((
+            Cover { image, read: None },
+            Name::new("cover"),
+            Mesh3d(mesh.0.clone()),
+            MeshMaterial3d(material),
+            Transform::IDENTITY,
+            NotShadowCaster,
+            ChildOf(surface),
+        ));
+        if let Some(layers) = layers {
+            cover.insert(layers.clone());
+        }
+    }
+}
+
+/// An empty picture that is repeated as the maps are.
+fn picture(wrap: [Wrap; 2]) -> Image {
+    let size = Extent3d { width: SIDE, height: SIDE, depth_or_array_layers: 1 };
+    let format = TextureFormat::Rgba8UnormSrgb;
+    let mut image =
+        Image::new_fill(size, TextureDimension::D2, &[0; 4], format, RenderAssetUsages::default());
+    let [address_mode_u, address_mode_v] = wrap.map(|wrap| match wrap {
+        Wrap::Repeat => ImageAddressMode::Repeat,
+        Wrap::Clamp => ImageAddressMode::ClampToEdge,
+    });
+    // A source is one or the other, and nothing in between.
+    let nearest = ImageSamplerDescriptor::nearest();
+    image.sampler =
+        ImageSampler::Descriptor(ImageSamplerDescriptor { address_mode_u, address_mode_v, ..nearest });
+    image
+}
+
+/// Reads a surface into the picture of its cover.
+fn paint(
+    settings: Res<Settings>,
+    wetness: WetnessQuery,
+    surfaces: Query<(&SurfaceWater, &WetGeometry)>,
+    mut covers: Query<(&mut Cover, &ChildOf)>,
+    mut images: ResMut<Assets<Image>>,
+) {
+    let shade = settings.views.shade;
+    let when = |cover: &Cover| cover.read.filter(|(of, _)| *of == shade).map(|(_, when)| when);
+    let is_due = |cover: &Cover| when(cover).is_none_or(|when| when.elapsed().as_secs_f32() >= EVERY);
+    let due = covers.iter_mut().filter(|(cover, _)| is_due(cover)).min_by_key(|(cover, _)| when(cover));
+    let Some((mut cover, surface)) = due.filter(|_| shade != Shade::Off) else { return };
+    let surface = surface.parent();
+    let Ok((water, geometry)) = surfaces.get(surface) else { return };
+    let Some(mut image) = images.get_mut(&cover.image) else { return };
+    let Some(data) = &mut image.data else { return };
+    for (pixel, index) in data.chunks_exact_mut(4).zip(0u32..) {
+        let uv = (Vec2::new((index % SIDE) as f32, (index / SIDE) as f32) + 0.5) / SIDE as f32;
+        let here = wetness.at_uv(surface, uv).unwrap_or_default();
+        let color = match shade {
+            Shade::Source => source_colour(water, geometry, &here, uv),
+            _ => maps::colour(part(shade, &here)),
+        };
+        pixel.copy_from_slice(&[color.r(), color.g(), color.b(), OPACITY]);
+    }
+    cover.read = Some((shade, Instant::now()));
+}
+
+/// From 0, black, to 1, white.
+fn part(shade: Shade, here: &Wetness) -> f32 {
+    match shade {
+        Shade::Film => here.film_mm / MOST_FILM_MM,
+        Shade::Saturation => here.saturation,
+        _ => here.wetness,
+    }
+}
+
+fn source_colour(water: &SurfaceWater, geometry: &WetGeometry, here: &Wetness, uv: Vec2) -> egui::Color32 {
+    if here.film_mm + here.absorbed_mm <= 0.0 {
+        return egui::Color32::BLACK;
+    }
+    let origin = maps::texel_at(water.size(), &geometry.0, uv).and_then(|texel| water.origin(texel));
+    sources::colour(origin.unwrap_or_default().source)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_is_brighter_and_a_picture_has_room_for_all_samples() {
+        let wet = Wetness { wetness: 0.5, film_mm: 0.25, absorbed_mm: 1.0, saturation: 0.75 };
+        assert_eq!(
+            [Shade::Wetness, Shade::Film, Shade::Saturation].map(|shade| part(shade, &wet)),
+            [0.5, 0.5, 0.75]
+        );
+        let image = picture([Wrap::Repeat, Wrap::Clamp]);
+        assert_eq!(image.data.map(|data| data.len()), Some(4 * (SIDE * SIDE) as usize));
+        let ImageSampler::Descriptor(sampler) = image.sampler else { panic!("it has a sampler of its own") };
+        assert!(matches!(sampler.address_mode_u, ImageAddressMode::Repeat));
+        assert!(matches!(sampler.address_mode_v, ImageAddressMode::ClampToEdge));
+    }
+}

@@ -1,0 +1,208 @@
+//! The library as a Bevy app meets it: what is built in, what is told, where its documentation leads.
+
+use std::path::Path;
+
+use bevy::asset::RenderAssetUsages;
+use bevy::mesh::PrimitiveTopology;
+use bevy::prelude::*;
+use bevy_weathering::effect::ShippedEffect;
+use bevy_weathering::emitter::{EmitterState, NotEmitting};
+use bevy_weathering::particle::WaterCounts;
+use bevy_weathering::prelude::*;
+use bevy_weathering::wetting::Refusal;
+
+use crate::wetting::scene::Scene;
+
+/// Frames without ticks, until there is an answer.
+fn update_until<T>(scene: &mut Scene, what: &str, mut ask: impl FnMut(&World) -> Option<T>) -> T {
+    for _ in 0..20_000 {
+        if let Some(answer) = ask(scene.0.world()) {
+            return answer;
+        }
+        scene.0.update();
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    panic!("never came: {what}");
+}
+
+fn update_for(scene: &mut Scene, frames: u32) {
+    for _ in 0..frames {
+        scene.0.update();
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+}
+
+fn load(scene: &Scene, path: &'static str) -> Handle<WeatherEffect> {
+    scene.0.world().resource::<AssetServer>().load(path)
+}
+
+/// Loads an effect that is there.
+fn loaded(scene: &mut Scene, path: &'static str) -> Handle<WeatherEffect> {
+    let handle = load(scene, path);
+    let is_there = |world: &World| world.resource::<Assets<WeatherEffect>>().contains(&handle).then_some(());
+    update_until(scene, path, is_there);
+    handle
+}
+
+#[test]
+fn shipped_effects_are_there_without_a_renderer_and_without_copies() {
+    let mut scene = Scene::new(60);
+    for shipped in ShippedEffect::ALL {
+        let handle = loaded(&mut scene, shipped.path);
+        let effects = scene.0.world().resource::<Assets<WeatherEffect>>();
+        assert_eq!(effects.get(&handle), shipped.read().ok().as_ref(), "{}", shipped.name);
+    }
+}
+
+/// 36 mm/h on 2 m by 2 m are 40 ml/s.
+#[test]
+fn rain_brings_as_much_as_it_says_and_the_floor_gets_it() {
+    let mut scene = Scene::new(60);
+    let plane = Plane3d::new(Vec3::Y, Vec2::splat(1.0));
+    let floor = scene.surface(plane.into(), 128, PorousMaterial::SAND, Transform::IDENTITY);
+    let rain = Emitter::rain(loaded(&mut scene, WeatherEffect::RAIN), 36.0, Vec2::splat(1.0));
+    let sky = scene.0.world_mut().spawn((rain, Transform::from_xyz(0.0, 1.0, 0.0))).id();
+    // It has a place in the world and a row among effects from the next frame on.
+    scene.run(1);
+    let emitted = |scene: &Scene| scene.0.world().resource::<WaterCounts>().emitted_nl as f64 * 1e-6;
+    let before = emitted(&scene);
+    scene.run(600);
+    let fallen = emitted(&scene) - before;
+    assert!((fallen / 400.0 - 1.0).abs() < 0.01, "{fallen} ml");
+
+    scene.0.world_mut().entity_mut(sky).despawn();
+    scene.run(180);
+    let over = scene.over(floor);
+    // Some of what is thrown up comes down beside it.
+    let (got, sent) = (f64::from(over.film_ml + over.absorbed_ml), emitted(&scene));
+    assert!(got > 0.85 * sent && got < 1.001 * sent, "{got} of {sent} ml");
+}
+
+#[test]
+fn an_emitter_whose_effect_cannot_be_had_is_marked_until_it_has_another() {
+    let mut scene = Scene::new(60);
+    // A file that is not there, and one that is no effect.
+    for path in ["effects/none.effect.ron", "CREDITS.md"] {
+        let effect = load(&scene, path);
+        let id = effect.id();
+        let emitter = scene.0.world_mut().spawn(Emitter { effect, ..default() }).id();
+        let marked = |world: &World| world.get::<NotEmitting>(emitter).cloned();
+        assert_eq!(update_until(&mut scene, path, marked), NotEmitting(id));
+
+        let mud = loaded(&mut scene, WeatherEffect::MUD);
+        scene.0.world_mut().get_mut::<Emitter>(emitter).unwrap().effect = mud;
+        update_until(&mut scene, "no mark", |world| marked(world).is_none().then_some(()));
+        scene.run(1);
+        scene.run(60);
+        assert!(scene.0.world().get::<EmitterState>(emitter).unwrap().emitted > 0, "{path}");
+        scene.0.world_mut().entity_mut(emitter).despawn();
+    }
+}
+
+/// What was told about surfaces.
+#[derive(Resource, Default)]
+struct Told {
+    ready: Vec<Entity>,
+    refused: Vec<SurfaceRefused>,
+}
+
+fn listen(
+    mut ready: MessageReader<SurfaceReady>,
+    mut refused: MessageReader<SurfaceRefused>,
+    mut told: ResMut<Told>,
+) {
+    told.ready.extend(ready.read().map(|message| message.surface));
+    told.refused.extend(refused.read());
+}
+
+fn listening() -> Scene {
+    let mut scene = Scene::new(60);
+    scene.0.init_resource::<Told>().add_systems(Update, listen);
+    scene
+}
+
+fn spawn(scene: &mut Scene, mesh: Mesh) -> Entity {
+    let mesh = scene.0.world_mut().resource_mut::<Assets<Mesh>>().add(mesh);
+    let maps = Weatherable { map_size: 64, ..default() };
+    scene.0.world_mut().spawn((maps, Mesh3d(mesh), Transform::default())).id()
+}
+
+fn plane() -> Mesh {
+    Plane3d::new(Vec3::Y, Vec2::ONE).into()
+}
+
+#[test]
+fn surfaces_tell_once_that_they_are_ready_or_refused() {
+    let mut scene = listening();
+    let floor = spawn(&mut scene, plane());
+    let line = Mesh::new(PrimitiveTopology::LineList, RenderAssetUsages::default())
+        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+        .with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, vec![[0.0, 0.0], [1.0, 0.0]]);
+    let line = spawn(&mut scene, line);
+    update_until(&mut scene, "messages", |world| {
+        let told = world.resource::<Told>();
+        (!told.ready.is_empty() && !told.refused.is_empty()).then_some(())
+    });
+    // It turns, and is measured again.
+    scene.0.world_mut().get_mut::<Transform>(floor).unwrap().rotate_x(0.7);
+    update_for(&mut scene, 200);
+    let told = scene.0.world().resource::<Told>();
+    assert_eq!(told.ready, [floor]);
+    let [refused] = told.refused[..] else { panic!("{:?}", told.refused) };
+    assert_eq!(refused.surface, line);
+    assert!(matches!(refused.reason, Refusal::Mesh(_)), "{}", refused.reason);
+
+    // What it says is true: water stays.
+    scene.pour(floor, Vec2::splat(0.5), 8, 40_000_000);
+    scene.run(2);
+    let over = scene.over(floor);
+    assert!(over.film_ml + over.absorbed_ml > 35.0, "{over:?}");
+
+    // One that is made weatherable again is ready again.
+    scene.0.world_mut().entity_mut(floor).remove::<Weatherable>();
+    scene.0.update();
+    scene.0.world_mut().entity_mut(floor).insert(Weatherable { map_size: 64, ..default() });
+    update_until(&mut scene, "the second time", |world| {
+        (world.resource::<Told>().ready == [floor, floor]).then_some(())
+    });
+}
+
+#[test]
+fn a_surface_without_room_for_its_maps_is_refused() {
+    let mut scene = listening();
+    scene.0.world_mut().resource_mut::<MapBudget>().bytes = 1;
+    let floor = spawn(&mut scene, plane());
+    let refused =
+        update_until(&mut scene, "a refusal", |world| world.resource::<Told>().refused.first().copied());
+    assert_eq!(refused, SurfaceRefused { surface: floor, reason: Refusal::NoRoom });
+    assert!(scene.0.world().resource::<Told>().ready.is_empty());
+}
+
+/// Markdown's definitions of links: label and target.
+fn definitions(text: &str) -> Vec<(&str, &str)> {
+    let pairs = text.lines().filter_map(|line| line.strip_prefix('[')?.split_once("]: "));
+    // Else it is a link with a colon behind it.
+    pairs.filter(|(label, _)| !label.contains(']')).collect()
+}
+
+/// The README is the front page of the crate's documentation, from where a path in the repository leads nowhere.
+#[test]
+fn links_of_the_readme_lead_somewhere_from_anywhere() {
+    const README: &str = include_str!("../README.md");
+    const LIB: &str = include_str!("../src/lib.rs");
+    let inline = README.match_indices("](").filter(|&(at, _)| !README[at + 2..].starts_with("http"));
+    assert_eq!(inline.count(), 0, "a link that only leads somewhere from the repository");
+
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let relative = definitions(README);
+    let head = LIB.split("#![doc").next().unwrap_or_default().replace("//! ", "");
+    let absolute = definitions(&head);
+    assert!(relative.len() > 5);
+    let labels = |all: &[(&str, &str)]| all.iter().map(|(label, _)| (*label).to_owned()).collect::<Vec<_>>();
+    assert_eq!(labels(&relative), labels(&absolute));
+    for ((label, file), (_, address)) in relative.iter().zip(&absolute) {
+        assert!(README.contains(&format!("][{label}]")), "{label} is not used");
+        assert!(root.join(file).is_file(), "{file}");
+        assert!(address.starts_with("https://") && address.ends_with(&format!("/main/{file}")), "{address}");
+    }
+}
