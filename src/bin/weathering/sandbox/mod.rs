@@ -132,7 +132,7 @@ fn spare_software_renderers(
     if !*is_small {
         *is_small = true;
         commands.insert_resource(DirectionalLightShadowMap { size: 1024 });
-        // A splat takes such a driver some 50 µs (benches/NOTES.md, `overlap`); the others wait.
+        // A splat takes such a driver some 10 µs (benches/NOTES.md, `overlap`); the others wait.
         commands.insert_resource(SplatBudget { per_frame: 4000, ..default() });
         for mut window in &mut windows {
             window.resolution.set(960.0, 540.0);
