@@ -11,7 +11,10 @@
     pbr_bindings,
     pbr_fragment::pbr_input_from_standard_material,
     pbr_functions::{alpha_discard, apply_pbr_lighting, main_pass_post_lighting_processing},
-    pbr_types::{PbrInput, STANDARD_MATERIAL_FLAGS_UNLIT_BIT},
+    pbr_types::{
+        PbrInput, STANDARD_MATERIAL_FLAGS_ALPHA_MODE_OPAQUE, STANDARD_MATERIAL_FLAGS_ALPHA_MODE_RESERVED_BITS,
+        STANDARD_MATERIAL_FLAGS_UNLIT_BIT,
+    },
 }
 #import bevy_weathering::{
     wet_lighting::apply_wet_lighting,
@@ -26,6 +29,10 @@
 
 #ifdef VISIBILITY_RANGE_DITHER
 #import bevy_pbr::pbr_functions::visibility_range_dither
+#endif
+
+#ifdef OIT_ENABLED
+#import bevy_core_pipeline::oit::oit_draw
 #endif
 
 #ifdef WEATHERED_UVS
@@ -58,6 +65,8 @@ fn apply_paint(pbr: ptr<function, PbrInput>, in: VertexOutput, frame: Frame) {
     let diffuse = textureSample(diffuse_map, map_sampler, uv);
     let base = (*pbr).material.base_color;
     (*pbr).material.base_color = vec4(base.rgb * (1.0 - diffuse.a) + diffuse.rgb, base.a);
+    // What covers metal is none.
+    (*pbr).material.metallic *= 1.0 - diffuse.a;
     let specular = textureSample(specular_map, map_sampler, uv);
     (*pbr).material.reflectance = (*pbr).material.reflectance * (1.0 - specular.a) + specular.r;
     (*pbr).material.perceptual_roughness =
@@ -147,8 +156,10 @@ fn weathered_color(pbr_input: PbrInput, in: VertexOutput, frame: Frame) -> vec4<
 #ifdef WEATHERED_STANDING
     let waves = ripples(uv, in.world_position.xyz, water.levelness);
     normal = relieved(frame, normal, -waves.xy);
-    // Rain that is not simulated knows no uvs: its waves are those of level water, laid on this one.
-    normal = reoriented(normal.xzy, relief_normal(-waves.zw)).xzy;
+    // Rain that is not simulated knows no uvs: its waves are those of level water, laid on this one. On a slope of 41 degrees
+    // water runs, and there are none.
+    let level = saturate(4.0 * frame.normal.y - 3.0);
+    normal = reoriented(normal.xzy, relief_normal(-level * waves.zw)).xzy;
 #endif
 #endif
     pbr.material.diffuse_transmission =
@@ -188,5 +199,13 @@ fn fragment(in: VertexOutput, @builtin(front_facing) is_front: bool) -> Fragment
 #endif
     }
     out.color = main_pass_post_lighting_processing(pbr, out.color);
+#ifdef OIT_ENABLED
+    // What is not opaque is only noted down here, and drawn when all of it is known.
+    let alpha_mode = pbr.material.flags & STANDARD_MATERIAL_FLAGS_ALPHA_MODE_RESERVED_BITS;
+    if alpha_mode != STANDARD_MATERIAL_FLAGS_ALPHA_MODE_OPAQUE {
+        oit_draw(in.position, out.color);
+        discard;
+    }
+#endif
     return out;
 }

@@ -10,7 +10,7 @@
 struct TexelMatter {
     // Loose and bound soil, mm without pores, two halves.
     dust_mud: u32,
-    // Snow, mm of snow, a half; the high one is not used.
+    // Snow, mm of snow, a half; above it 1 where the mesh lies.
     snow: u32,
 }
 
@@ -22,6 +22,17 @@ const SNOW_SCATTERING_PER_MM: f32 = 0.135;
 // Loose soil, bound soil and snow of a texel, mm.
 fn matter_depths(texel: TexelMatter) -> vec3<f32> {
     return vec3(unpack2x16float(texel.dust_mud), unpack2x16float(texel.snow).x);
+}
+
+// Whether the mesh lies at a texel.
+fn lies(texel: TexelMatter) -> bool {
+    return (texel.snow >> 16u) != 0u;
+}
+
+// How much deeper it lies before a place than behind it, mm. before, here, after: depths, mm; below 0 where nothing of the mesh
+// lies: what lies `here` goes on there.
+fn heap_fall(before: f32, here: f32, after: f32) -> f32 {
+    return select(before, here, before < 0.0) - select(after, here, after < 0.0);
 }
 
 // Part of a surface that grains cover, 1 - exp(-3/2 h / g). depth_mm: h, at least 0; grain_mm: g, above 0.

@@ -5,6 +5,9 @@
 //
 // Barre-Brisebois and Hill 2012, "Blending in Detail". Mikkelsen 2010, "Bump mapping unparametrized surfaces on the GPU".
 
+// Sine between the ways of the uvs along two sides of a pixel below which they are taken as one: less is rounding.
+const LEAST_SINE: f32 = 1e-6;
+
 // How uvs lie on a surface at a point.
 struct Frame {
     // The direction in which u grows, and upright on it, to the side to which v grows.
@@ -45,7 +48,7 @@ fn faced(normal: vec3<f32>, side: vec3<f32>) -> vec3<f32> {
 // The frame of a point, from how position (metres) and uv change over the screen. normal: of the surface without relief.
 fn surface_frame(normal: vec3<f32>, dp_dx: vec3<f32>, dp_dy: vec3<f32>, duv_dx: vec2<f32>, duv_dy: vec2<f32>) -> Frame {
     let determinant = duv_dx.x * duv_dy.y - duv_dx.y * duv_dy.x;
-    if determinant == 0.0 {
+    if abs(determinant) <= LEAST_SINE * length(duv_dx) * length(duv_dy) {
         return Frame(vec3(0.0), vec3(0.0), normal, 0.0, vec2(0.0));
     }
     let p_u = (dp_dx * duv_dy.y - dp_dy * duv_dx.y) / determinant;

@@ -85,7 +85,8 @@ fn matter_coefficients(point: Point, input: ptr<function, lighting::LightingInpu
 #endif
     if has_flag(FLAG_SOLID) {
         (*input).diffuse_color = kd;
-        (*input).F0_dielectric *= terms.ks_dry / max(porous.k_s, 1e-6);
+        // k_s' / k_s, also where k_s is 0.
+        (*input).F0_dielectric *= 1.0 - point.alpha_poro * terms.g;
     } else {
         (*input).diffuse_color *= kd / max(terms.kd_dry, vec3(1e-6));
     }

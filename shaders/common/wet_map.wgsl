@@ -5,7 +5,7 @@
 #import bevy_weathering::drying::{Amounts, evolve, water_look}
 #import bevy_weathering::footprint::axis_taps
 #import bevy_weathering::hnat::wet_tau
-#import bevy_weathering::matter::{TexelMatter, matter_depths, settled_soil}
+#import bevy_weathering::matter::{TexelMatter, heap_fall, lies, matter_depths, settled_soil}
 #import bevy_weathering::ripples::{ring_slope, RING_SECONDS}
 
 // Constants of a surface; the twin of `PorousUniform` in `src/material/extension.rs`.
@@ -179,7 +179,9 @@ fn seconds_since(tick: u32) -> f32 {
 // What the weather could have taken until a tick, from air and sun.
 fn demand_until(tick: u32) -> vec2<f32> {
     let point = clock.points[point_at(tick)];
-    return vec2(point.air_mm, point.sun_mm) + vec2(point.air_per_tick, point.sun_per_tick) * f32(tick - point.tick);
+    // Before the first point nothing was taken.
+    let ticks = f32(max(tick, point.tick) - point.tick);
+    return vec2(point.air_mm, point.sun_mm) + vec2(point.air_per_tick, point.sun_per_tick) * ticks;
 }
 
 // The last point at or before a tick.
@@ -280,10 +282,11 @@ fn held_at(uv: vec2<f32>) -> Held {
     return mix_held(upper, lower, v.part);
 }
 
-// Depth of snow and soil at a texel, mm, for slopes.
+// Depth of snow and soil at a texel, mm, for slopes; below 0 where the mesh does not lie.
 fn heap_mm(texel: vec2<i32>) -> f32 {
-    let depths = matter_depths(matter[texel_index(texel)]);
-    return depths.x + depths.y + depths.z;
+    let stored = matter[texel_index(texel)];
+    let depths = matter_depths(stored);
+    return select(-1.0, depths.x + depths.y + depths.z, lies(stored));
 }
 
 // How fast what lies here falls, metres per unit of u and of v.
@@ -295,17 +298,22 @@ fn heap_falls(uv: vec2<f32>) -> vec2<f32> {
     // Where a pixel covers many texels, falls over as many of them.
     let reach = max(vec2<i32>(0.5 * min(covered, vec2(size))), vec2(1));
     var sum = vec2(0.0);
+    var weights = 0.0;
     for (var i = 0; i < 4; i += 1) {
         let is_high = vec2(i % 2 == 1, i / 2 == 1);
         let at = select(vec2(u.low, v.low), vec2(u.high, v.high), is_high);
-        let weight = select(1.0 - vec2(u.part, v.part), vec2(u.part, v.part), is_high);
-        let along = vec2(
-            heap_mm(at - vec2(reach.x, 0)) - heap_mm(at + vec2(reach.x, 0)),
-            heap_mm(at - vec2(0, reach.y)) - heap_mm(at + vec2(0, reach.y)),
+        let along = select(1.0 - vec2(u.part, v.part), vec2(u.part, v.part), is_high);
+        let here = heap_mm(at);
+        // From afar a pixel may reach beyond the gutter of its island.
+        let weight = select(along.x * along.y, 0.0, here < 0.0);
+        let fall = vec2(
+            heap_fall(heap_mm(at - vec2(reach.x, 0)), here, heap_mm(at + vec2(reach.x, 0))),
+            heap_fall(heap_mm(at - vec2(0, reach.y)), here, heap_mm(at + vec2(0, reach.y))),
         );
-        sum += weight.x * weight.y * along / vec2<f32>(reach);
+        sum += weight * fall / vec2<f32>(reach);
+        weights += weight;
     }
-    return sum * size / 2000.0;
+    return sum / max(weights, 1e-6) * size / 2000.0;
 }
 
 // How wet the played map says a point is, 0..=1. Grey g wets at (1 - g)(1 - t_fill), 0 never; drying is that backwards.

@@ -21,7 +21,8 @@ pub struct EffectRow {
     pub effect: Option<WeatherEffect>,
     /// Diameters of its drops by size class, mm.
     pub diameters_mm: [f32; SIZE_CLASSES],
-    /// Numbers of its stamps in the [`StampAtlas`](crate::overlay::StampAtlas): the first, and how many there are.
+    /// Numbers of its stamps in the [`StampAtlas`](crate::overlay::StampAtlas): the first, and how many
+    /// variants there are.
     pub stamps: (u32, u32),
     /// The effect's own, or made for it; none of domes.
     stamp_set: Option<Arc<StampSet>>,

@@ -214,7 +214,8 @@ fn painted(dry: &Dry, held: &Held) -> Dry {
     Dry {
         color: std::array::from_fn(|i| dry.color[i] * (1.0 - diffuse[3]) + diffuse[i]),
         roughness: dry.roughness * (1.0 - specular[3]) + specular[3] - specular[1],
-        metallic: dry.metallic,
+        // What covers metal is none.
+        metallic: dry.metallic * (1.0 - diffuse[3]),
         normal: if slopes == DVec2::ZERO { dry.normal } else { reoriented(dry.normal, relief) },
     }
 }
@@ -279,6 +280,8 @@ mod tests {
             let wet = look.weathered(&metal, &held);
             assert!((0..3).all(|i| (wet.color[i] - metal.color[i]).abs() < 1e-9), "{wet:?}");
             assert!(wet.roughness < 0.1, "{wet:?}");
+            let half_painted = Held { diffuse: [0.1, 0.1, 0.1, 0.5], ..Held::default() };
+            assert_eq!(look.weathered(&metal, &half_painted).metallic, 0.5);
         }
     }
 

@@ -5,7 +5,7 @@ use bevy::material::OpaqueRendererMethod;
 use bevy::prelude::*;
 
 use super::uniform::SurfaceLook;
-use super::warm_up::{ShaderChanges, Understudy, rehearse};
+use super::warm_up::{ShaderChanges, Understudy, part_of, rehearse};
 use super::{
     ClockBuffer, PlayedWetMap, PorousExtension, PorousMaterial, StandingWater, WeatheredMaterial,
     WettingTextures,
@@ -152,7 +152,7 @@ pub(super) fn follow_surfaces(
     standard: Res<Assets<StandardMaterial>>,
     mut weathered: ResMut<Assets<WeatheredMaterial>>,
     changed: Query<(Entity, Surface, &DryMaterial, &MeshMaterial3d<WeatheredMaterial>), Edited>,
-    understudies: Query<(Entity, &ChildOf), With<Understudy>>,
+    understudies: Query<(Entity, &ChildOf, &MeshMaterial3d<WeatheredMaterial>), With<Understudy>>,
 ) {
     for (entity, surface, dry, handle) in &changed {
         let Some(mut material) = weathered.get_mut(handle) else { continue };
@@ -163,11 +163,154 @@ pub(super) fn follow_surfaces(
         let old = material.extension.key;
         let next = WeatheredMaterial { base: material.base.clone(), extension: extension.clone() };
         material.extension = extension;
-        if next.extension.key != old && *changes == ShaderChanges::WhenCompiled {
-            material.extension.key = old;
-            drop(material);
-            let next = weathered.add(next);
-            rehearse(&mut commands, entity, next, &understudies);
+        if *changes == ShaderChanges::AtOnce {
+            continue;
+        }
+        let waiting = understudies.iter().find(|(_, surface, _)| surface.parent() == entity);
+        if next.extension.key == old {
+            // What was to come has been taken back.
+            if let Some((understudy, ..)) = waiting {
+                commands.entity(understudy).despawn();
+            }
+            continue;
+        }
+        material.extension.key = old;
+        drop(material);
+        if let Some((understudy, _, shown)) = waiting {
+            if let Some(mut shown) = weathered.get_mut(shown)
+                && shown.extension.key == next.extension.key
+            {
+                // It rehearses on: of a surface whose constants change in every frame, none would ever come to an end.
+                *shown = part_of(next);
+                continue;
+            }
+            commands.entity(understudy).despawn();
+        }
+        let next = weathered.add(part_of(next));
+        rehearse(&mut commands, entity, next);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::light::NotShadowCaster;
+
+    use super::*;
+    use crate::overlay::Wrap;
+
+    /// A surface on which nothing has fallen yet, and what follows it.
+    struct Stage {
+        world: World,
+        follow: Schedule,
+        surface: Entity,
+    }
+
+    impl Stage {
+        fn new(dry: StandardMaterial) -> Self {
+            let mut world = World::new();
+            let maps = Overlays {
+                size: 64,
+                wrap: [Wrap::Repeat; 2],
+                diffuse: default(),
+                specular: default(),
+                normal: default(),
+                state: default(),
+                has_room: false,
+                matter: default(),
+                has_matter_room: false,
+                rings: default(),
+                has_colors: false,
+            };
+            let (buffer, clock, matter) =
+                (ClockBuffer(default()), WeatheringClock::new(60), MatterLook::default());
+            let traces = SurfaceTraces::default();
+            let extension =
+                extension((&maps, &traces, None, None, None, None, None), &buffer, &clock, &matter);
+            let mut weathered = Assets::<WeatheredMaterial>::default();
+            let material = weathered.add(WeatheredMaterial { base: dry.clone(), extension });
+            let mut standard = Assets::<StandardMaterial>::default();
+            let dry = DryMaterial(standard.add(dry));
+            world.insert_resource(buffer);
+            world.insert_resource(clock);
+            world.insert_resource(matter);
+            world.insert_resource(ShaderChanges::WhenCompiled);
+            world.insert_resource(weathered);
+            world.insert_resource(standard);
+            let surface =
+                world.spawn((maps, traces, dry, MeshMaterial3d(material), Mesh3d(Handle::default()))).id();
+            let mut follow = Schedule::default();
+            follow.add_systems(follow_surfaces);
+            follow.run(&mut world);
+            Self { world, follow, surface }
+        }
+
+        /// Says whether water is on it, and follows.
+        fn wet(&mut self, water: bool) {
+            self.world.get_mut::<SurfaceTraces>(self.surface).unwrap().water = water;
+            self.follow.run(&mut self.world);
+        }
+
+        fn understudies(&mut self) -> Vec<Entity> {
+            let mut query = self.world.query_filtered::<Entity, With<Understudy>>();
+            query.iter(&self.world).collect()
+        }
+
+        fn shown_by(&self, entity: Entity) -> &WeatheredMaterial {
+            let handle = self.world.get::<MeshMaterial3d<WeatheredMaterial>>(entity).unwrap();
+            self.world.resource::<Assets<WeatheredMaterial>>().get(handle).unwrap()
+        }
+    }
+
+    #[test]
+    fn a_change_that_is_taken_back_sends_its_understudy_away() {
+        let mut stage = Stage::new(StandardMaterial::default());
+        assert!(stage.understudies().is_empty());
+        stage.wet(true);
+        let &[understudy] = stage.understudies().as_slice() else { panic!("one understudy") };
+        assert!(stage.shown_by(understudy).extension.key.water);
+        assert!(!stage.shown_by(stage.surface).extension.key.water);
+        // It would bring a shader that nobody wants any more.
+        stage.wet(false);
+        assert!(stage.understudies().is_empty());
+    }
+
+    #[test]
+    fn constants_that_change_in_every_frame_do_not_keep_an_understudy_from_its_end() {
+        let mut stage = Stage::new(StandardMaterial::default());
+        stage.wet(true);
+        let first = stage.understudies();
+        for t_fill in [0.1, 0.2, 0.3] {
+            stage.world.entity_mut(stage.surface).insert(PorousMaterial { t_fill, ..default() });
+            stage.follow.run(&mut stage.world);
+            assert_eq!(stage.understudies(), first);
+            assert_eq!(stage.shown_by(first[0]).extension.params.t_fill, t_fill);
+            assert_eq!(stage.shown_by(stage.surface).extension.params.t_fill, t_fill);
+        }
+    }
+
+    #[test]
+    fn an_understudy_has_the_shadow_of_its_surface() {
+        let mut stage = Stage::new(StandardMaterial::default());
+        stage.wet(true);
+        // Else the pipeline of the shadow would come too late, and the shadow be gone for a while.
+        assert!(!stage.world.entity(stage.understudies()[0]).contains::<NotShadowCaster>());
+        let mut stage = Stage::new(StandardMaterial::default());
+        stage.world.entity_mut(stage.surface).insert(NotShadowCaster);
+        stage.wet(true);
+        assert!(stage.world.entity(stage.understudies()[0]).contains::<NotShadowCaster>());
+    }
+
+    #[test]
+    fn nothing_is_blended_twice() {
+        for (alpha_mode, expected) in
+            [(AlphaMode::Blend, 0.0), (AlphaMode::Add, 0.0), (AlphaMode::Opaque, 1.0)]
+        {
+            let mut stage = Stage::new(StandardMaterial { alpha_mode, ..default() });
+            stage.wet(true);
+            let understudy = stage.understudies()[0];
+            let shown = &stage.shown_by(understudy).base;
+            assert_eq!((shown.base_color.alpha(), shown.alpha_mode), (expected, alpha_mode));
+            assert_eq!(stage.shown_by(stage.surface).base.base_color.alpha(), 1.0);
         }
     }
 }

@@ -26,6 +26,9 @@
 
 use bevy::math::{DVec2, DVec3};
 
+/// Sine between the ways of the uvs along two sides of a pixel below which they are taken as one: less is rounding.
+const LEAST_SINE: f64 = 1e-6;
+
 /// How uvs lie on a surface at a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
@@ -73,7 +76,7 @@ pub fn surface_frame(normal: DVec3, dp_dx: DVec3, dp_dy: DVec3, duv_dx: DVec2, d
     let nothing =
         Frame { along_u: DVec3::ZERO, along_v: DVec3::ZERO, normal, per_u: 0.0, per_v: DVec2::ZERO };
     let determinant = duv_dx.perp_dot(duv_dy);
-    if determinant == 0.0 {
+    if determinant.abs() <= LEAST_SINE * duv_dx.length() * duv_dy.length() {
         return nothing;
     }
     let p_u = (dp_dx * duv_dy.y - dp_dy * duv_dx.y) / determinant;
@@ -193,7 +196,11 @@ mod tests {
     #[test]
     fn uvs_that_say_nothing_leave_the_normal_alone() {
         let base = relief_normal(DVec2::new(0.2, 0.1));
-        for (dp_dy, duv_dy) in [(DVec3::Y, DVec2::X), (DVec3::X, DVec2::Y)] {
+        // One line, as nearly one as rounding leaves it, and no way at all.
+        let nearly = DVec2::new(1.0, 1e-8);
+        for (dp_dy, duv_dy) in
+            [(DVec3::Y, DVec2::X), (DVec3::X, DVec2::Y), (DVec3::Y, nearly), (DVec3::Y, DVec2::ZERO)]
+        {
             let frame = surface_frame(DVec3::Z, DVec3::X, dp_dy, DVec2::X, duv_dy);
             assert_eq!(relieved(frame, base, DVec2::ONE), base);
             assert_eq!(slopes_in_frame(frame, DVec2::ONE), DVec2::ZERO);

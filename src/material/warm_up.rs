@@ -2,7 +2,8 @@
 //!
 //! Bevy does not draw what it has no pipeline for, and makes pipelines in the background. So a surface keeps the shader it
 //! has, and an understudy, a child that shows the same mesh with the next one, makes Bevy compile it. When no pipeline is
-//! waited for any more, the surface takes over the new shader and the understudy leaves.
+//! waited for any more, the surface takes over the new shader and the understudy leaves. It casts a shadow where the surface
+//! does, since that has a pipeline of its own for each shader. Of what is blended it shows nothing: twice would be seen.
 //!
 //! Where pipelines are compiled at once there is nothing to wait for, and no understudy.
 
@@ -10,7 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bevy::camera::visibility::{NoFrustumCulling, RenderLayers};
-use bevy::light::NotShadowCaster;
+use bevy::light::{NotShadowCaster, NotShadowReceiver};
 use bevy::mesh::morph::MeshMorphWeights;
 use bevy::mesh::skinning::SkinnedMesh;
 use bevy::prelude::*;
@@ -70,30 +71,33 @@ fn count_waiting(cache: Res<PipelineCache>, waiting: Res<Waiting>) {
     waiting.0.store(cache.waiting_pipelines().count(), Ordering::Relaxed);
 }
 
-/// Lets an understudy show what a surface will show next; in place of the one it may have.
-pub(super) fn rehearse(
-    commands: &mut Commands,
-    surface: Entity,
-    next: Handle<WeatheredMaterial>,
-    understudies: &Query<(Entity, &ChildOf), With<Understudy>>,
-) {
-    for (entity, _) in understudies.iter().filter(|(_, parent)| parent.parent() == surface) {
-        commands.entity(entity).despawn();
-    }
+/// Lets an understudy show what a surface will show next.
+pub(super) fn rehearse(commands: &mut Commands, surface: Entity, next: Handle<WeatheredMaterial>) {
     commands
         .entity(surface)
         .clone_and_spawn_with_opt_in(|cloner| {
             // What the choice of a pipeline, and being seen at all, depends on.
-            cloner.allow::<(Mesh3d, SkinnedMesh, MeshMorphWeights, RenderLayers, NoFrustumCulling)>();
+            cloner.allow::<(Mesh3d, SkinnedMesh, MeshMorphWeights, RenderLayers)>();
+            cloner.allow::<(NoFrustumCulling, NotShadowCaster, NotShadowReceiver)>();
         })
         .insert((
             Understudy { frames: 0 },
             Name::new("understudy"),
             MeshMaterial3d(next),
             Transform::IDENTITY,
-            NotShadowCaster,
             ChildOf(surface),
         ));
+}
+
+/// What an understudy shows: the next shader's pipeline, but nothing to see where it would be blended over the surface.
+pub(super) fn part_of(mut next: WeatheredMaterial) -> WeatheredMaterial {
+    let is_blended =
+        !matches!(next.base.alpha_mode, AlphaMode::Opaque | AlphaMode::Mask(_) | AlphaMode::AlphaToCoverage);
+    if is_blended {
+        next.base.base_color = Color::NONE;
+        next.base.emissive = LinearRgba::BLACK;
+    }
+    next
 }
 
 /// Gives surfaces their next shader once it is compiled.

@@ -65,8 +65,13 @@ impl Default for MatterLook {
 pub struct GpuTexelMatter {
     /// Loose (low) and bound soil, mm without pores, as two `f16`.
     pub dust_mud: u32,
-    /// Depth of snow, mm of snow (low), as `f16`; the high half is not used.
+    /// Depth of snow, mm of snow (low), as `f16`; the high half is 1 where the mesh lies, else 0.
     pub snow: u32,
+}
+
+impl GpuTexelMatter {
+    /// The high half of [`Self::snow`] of a texel on the mesh.
+    const LIES: u32 = 1 << 16;
 }
 
 /// The deepest that is told, mm: `f16` ends soon after.
@@ -85,18 +90,18 @@ pub fn pack_matter(
     geometry: &TexelGeometry,
     texel: u32,
 ) -> GpuTexelMatter {
+    let lies = geometry.owner(texel).is_some() || geometry.area_mm2()[texel as usize] > 0.0;
+    let bare = GpuTexelMatter { dust_mud: 0, snow: if lies { GpuTexelMatter::LIES } else { 0 } };
     // What is on maps of another size is gone.
     let texels: &[TexelMatter] = if matter.size == geometry.size() { matter.texels() } else { &[] };
-    let Some(state) = texels.get(texel as usize).filter(|state| !state.is_clean()) else {
-        return GpuTexelMatter::default();
-    };
+    let Some(state) = texels.get(texel as usize).filter(|state| !state.is_clean()) else { return bare };
     let unit_mm = geometry.unit_mm(units, texel);
     let half = |units: u32, scale: f64| {
         u32::from(f16::from_f64((f64::from(units) * unit_mm * scale).min(DEEPEST_MM)).to_bits())
     };
     GpuTexelMatter {
         dust_mud: half(state.dust, 1.0) | half(state.mud, 1.0) << 16,
-        snow: half(state.snow, 1.0 / RELATIVE_DENSITY),
+        snow: half(state.snow, 1.0 / RELATIVE_DENSITY) | bare.snow,
     }
 }
 
@@ -135,6 +140,13 @@ pub fn snow_albedo(ground: f64, deep: f64, depth_mm: f64) -> f64 {
     (above / deep * through - deep * below) / (above * through - below)
 }
 
+/// How much deeper it lies before a place than behind it, mm. `before`, `here`, `after`: depths, mm; below 0 where nothing of the
+/// mesh lies, as beside an island of the map: what lies `here` goes on there, or every island would have a rim.
+pub fn heap_fall(before: f64, here: f64, after: f64) -> f64 {
+    let depth = |depth: f64| if depth < 0.0 { here } else { depth };
+    depth(before) - depth(after)
+}
+
 /// Perceptual roughness under a cover. `base`, `matter`: roughnesses; `cover`: by [`matter_cover`]; all 0..=1.
 pub fn roughness_under(base: f64, matter: f64, cover: f64) -> f64 {
     base + (matter - base) * cover
@@ -142,9 +154,13 @@ pub fn roughness_under(base: f64, matter: f64, cover: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use bevy::math::Affine3A;
+
     use super::super::test_world::{Ground, Place};
     use super::super::texel::MatterKind;
     use super::*;
+    use crate::collision::MeshTriangles;
+    use crate::overlay::Wrap;
 
     #[test]
     fn a_layer_of_grains_as_thick_as_one_covers_most_and_layers_multiply() {
@@ -196,17 +212,39 @@ mod tests {
             ground.matter.receive(33, kind, units);
         }
         let pack = |texel| pack_matter(&ground.matter, ground.water.units, &place.geometry, texel);
-        let halves = |word: u32| [word, word >> 16].map(|half| f16::from_bits(half as u16).to_f64());
+        let half = |bits: u32| f16::from_bits(bits as u16).to_f64();
+        let halves = |word: u32| [word, word >> 16].map(half);
         let near = |found: [f64; 2], expected: [f64; 2]| {
             found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() <= 1e-3 * expected)
         };
         let packed = pack(33);
         assert!(near(halves(packed.dust_mud), [0.25, 0.5]), "{packed:?}");
-        assert!(near(halves(packed.snow), [20.0, 0.0]), "{packed:?}");
-        assert_eq!(pack(34), GpuTexelMatter::default());
-        assert_eq!(
-            pack_matter(&SurfaceMatter::default(), ground.water.units, &place.geometry, 33),
-            GpuTexelMatter::default()
-        );
+        assert!((half(packed.snow) - 20.0).abs() <= 0.02 && packed.snow >> 16 == 1, "{packed:?}");
+        let bare = GpuTexelMatter { dust_mud: 0, snow: 1 << 16 };
+        assert_eq!(pack(34), bare);
+        assert_eq!(pack_matter(&SurfaceMatter::default(), ground.water.units, &place.geometry, 33), bare);
+    }
+
+    #[test]
+    fn beside_an_island_nothing_lies() {
+        let corners = [Vec2::ZERO, Vec2::X, Vec2::Y];
+        let triangles = MeshTriangles {
+            positions: vec![corners.map(|at| Vec3::new(at.x, 0.0, at.y))],
+            uvs: vec![corners.map(|at| at * 0.5)],
+            source: vec![0],
+            ..default()
+        };
+        let wrap = [Wrap::Clamp; 2];
+        let geometry = TexelGeometry::new(&triangles, &Affine3A::IDENTITY, Vec3::Y, 16, wrap);
+        let units = Units { shift: 0 };
+        let pack = |texel| pack_matter(&SurfaceMatter::default(), units, &geometry, texel).snow >> 16;
+        assert_eq!([pack(0), pack(16 + 2), pack(15), pack(16 * 12 + 12)], [1, 1, 0, 0]);
+    }
+
+    #[test]
+    fn snow_falls_off_where_it_is_less_deep_and_not_where_the_map_ends() {
+        assert_eq!(heap_fall(5.0, 4.0, 3.0), 2.0);
+        assert_eq!(heap_fall(-1.0, 4.0, 3.0), 1.0);
+        assert_eq!([heap_fall(4.0, 4.0, -1.0), heap_fall(-1.0, 4.0, -1.0)], [0.0; 2]);
     }
 }

@@ -1,13 +1,13 @@
 //! The stamp an impact leaves: as large in metres as its effect says, wherever the uvs are wide or narrow.
 
-use bevy::math::Vec3A;
+use bevy::math::{Mat3A, Vec3A};
 use bevy::prelude::*;
 use bytemuck::Zeroable;
 
 use super::frames::pack_axis;
 use super::site::Site;
 use super::splat::pack_unorm;
-use super::{Splat, Wrap};
+use super::{Splat, StampAtlas, Wrap};
 use crate::collision::Impact;
 use crate::effect::drops::{drop_mm3, spread_mm};
 use crate::effect::{EffectRow, StampTurn, WeatherEffect};
@@ -76,8 +76,6 @@ pub(super) fn splat_from_impact(
     let long = own * stretch;
     let [r, g, b] = effect.diffuse.color;
     let [reflectance, smoothness, unused] = effect.specular.color;
-    let (first, count) = row.stamps;
-    let stamp = if count == 0 { 0 } else { first + pcg(impact.sequence.0 ^ 0x5bd1_e995) % count };
     let mut splat = Splat {
         center: Splat::center_from_uv(impact.uv, size, wrap),
         radius: Splat::radius_from_uv(impact.uv_per_metre * long, size),
@@ -87,9 +85,12 @@ pub(super) fn splat_from_impact(
         specular: pack_unorm([reflectance, smoothness, unused, effect.specular.opacity]),
         bump: (effect.bump * 127.0).round() as i32,
         bump_opacity: if effect.bump == 0.0 { 0 } else { 255 },
-        stamp,
         ..Zeroable::zeroed()
     };
+    if let (first, count @ 1..) = row.stamps {
+        let variant = pcg(impact.sequence.0 ^ 0x5bd1_e995) % count;
+        splat.stamp = StampAtlas::number(first, variant, splat.radius, stretch);
+    }
     // The map lies on the front.
     let front = if impact.back { -impact.normal } else { impact.normal };
     let axes = Axes::new(impact, effect.stamp_turn, front);
@@ -125,12 +126,35 @@ fn lay_in_space(splat: &mut Splat, site: &Site, rows: [Vec3; 3], axes: &Axes, ra
     let in_mesh = |axis: Vec3| Vec3::from(matrix.transpose() * Vec3A::from(axis));
     let row = |axis: Vec3| in_mesh(axis).to_array().map(|part| (f64::from(part) * scale).round() as i32);
     [splat.row_s, splat.row_t, splat.row_n] = rows.map(row);
-    let metres_per_step = step * matrix.determinant().abs().cbrt();
+    let metres_per_step = step * least_stretch(matrix);
     splat.origin = frames.steps(site.point);
-    splat.reach = (2.0 * radius / metres_per_step.max(1e-12)).ceil().clamp(2.0, 131_070.0) as i32;
+    let reach = (2.0 * radius / metres_per_step.max(1e-12)).ceil().clamp(2.0, 131_070.0);
+    // `framed` adds up three products of a row with it.
+    let largest = [splat.row_s, splat.row_t, splat.row_n].into_iter().flatten().map(i32::unsigned_abs).max();
+    splat.reach =
+        (reach as i32).min((i64::from(i32::MAX) / (3 * i64::from(largest.unwrap_or(1).max(1)))) as i32);
     let axis = |axis: Vec3| pack_axis(in_mesh(axis).normalize_or_zero());
     (splat.axis_s, splat.axis_t, splat.axis_n) = (axis(axes.s), axis(axes.t), axis(axes.n));
     splat.in_space = 1;
+}
+
+/// The length, in metres, of what is shortest in the world of all that has the length 1 in the mesh: the least singular value, or
+/// up to 4 % less.
+fn least_stretch(world_from_mesh: Mat3A) -> f32 {
+    // The greatest eigenvalue of a symmetric matrix is no greater than its norm; its powers come ever nearer.
+    let norm = |matrix: &Mat3A| {
+        [matrix.x_axis, matrix.y_axis, matrix.z_axis]
+            .map(|row| row.abs().element_sum())
+            .into_iter()
+            .fold(0.0, f32::max)
+    };
+    let inverse = (world_from_mesh.transpose() * world_from_mesh).inverse_or_zero();
+    let first = norm(&inverse);
+    let power = (0..3).fold(inverse * first.recip(), |power, _| power * power);
+    let greatest = first * norm(&power).sqrt().sqrt().sqrt();
+    let least = greatest.sqrt().recip();
+    // Flat as a sheet of paper, or no matrix at all.
+    if least.is_finite() && least > 0.0 { least } else { world_from_mesh.determinant().abs().cbrt() }
 }
 
 /// An even number in [0, 1).
@@ -249,6 +273,56 @@ mod tests {
             let distance = ((s * s + t * t) as f32).sqrt();
             assert!((distance - 128.0).abs() < 2.0 && n.abs() <= 1, "{s} {t} {n}");
         }
+    }
+
+    #[test]
+    fn on_a_surface_that_is_scaled_more_in_one_direction_a_stamp_is_round_and_whole() {
+        let plane = Mesh::from(Plane3d::new(Vec3::Y, Vec2::ONE));
+        let triangles = MeshTriangles::from_mesh(&plane).unwrap();
+        let wrap = [Wrap::Clamp; 2];
+        let geometry = TexelGeometry::new(&triangles, &Affine3A::IDENTITY, Vec3::Y, 64, wrap);
+        let frames = Frames::new(&triangles, &geometry, wrap);
+        let scale = Vec3::new(1.0, 1.0, 0.125);
+        let world_from_mesh = Affine3A::from_scale(scale);
+        let hit = Impact { point: Vec3::ZERO, uv_per_metre: Vec2::new(0.5, 4.0), ..impact(Vec3::NEG_Y) };
+        let site = Site::rigid(&frames, &world_from_mesh, hit.point);
+        let splat = splat(&hit, WeatherEffect { stamp_turn: StampTurn::Flight, ..paint(0.1) }, Some(&site));
+        let mut tiles = vec![];
+        frames.tiles_near(splat.origin, splat.reach / 2, |tile| tiles.push(tile));
+        let mut inside = 0;
+        for (texel, frame) in (0u32..).zip(&frames.texels) {
+            let Some(at) = frame.place() else { continue };
+            let away = [0, 1, 2].map(|axis| at[axis] - splat.origin[axis]);
+            let way = IVec3::from_array(away).as_vec3() * frames.step() * scale;
+            let expected = way.length() / 0.1;
+            let [s, t] = [splat.row_s, splat.row_t]
+                .map(|row| super::super::kernel::framed(row, away, splat.reach) as f32 / 256.0);
+            let part = s.hypot(t);
+            if expected < 1.0 {
+                inside += 1;
+                assert!((part - expected).abs() < 0.03, "{texel}: {part} for {expected}");
+                assert!(tiles.contains(&(texel / 64 / 16 * 4 + texel % 64 / 16)), "{texel}: {tiles:?}");
+            } else {
+                assert!(part > 0.97, "{texel}: {part} for {expected}");
+            }
+        }
+        // An ellipse of 0.1 by 0.8 on a map of 2 by 2, 64 texels along each side.
+        assert!((240..270).contains(&inside), "{inside}");
+    }
+
+    #[test]
+    fn the_least_stretch_is_that_of_the_shortest_axis_however_it_is_turned() {
+        for scale in
+            [Vec3::splat(0.3), Vec3::new(2.0, 1.0, 5.0), Vec3::new(-0.1, 1.0, 1.0), Vec3::splat(1e-4)]
+        {
+            for turn in [Quat::IDENTITY, Quat::from_euler(EulerRot::XYZ, 0.4, 1.1, -0.8)] {
+                let matrix =
+                    Mat3A::from_quat(turn) * Mat3A::from_diagonal(scale) * Mat3A::from_quat(turn.inverse());
+                let part = least_stretch(matrix) / scale.abs().min_element();
+                assert!((0.96..1.001).contains(&part), "{scale} {turn}: {part}");
+            }
+        }
+        assert!(!least_stretch(Mat3A::ZERO).is_nan());
     }
 
     #[test]

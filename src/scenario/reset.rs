@@ -7,7 +7,7 @@ use super::timeline::rewind;
 use crate::clock::WeatheringClock;
 use crate::emitter::{Emitter, EmitterState, NewParticles};
 use crate::matter::{FallingSnow, MatterQueue, SurfaceMatter};
-use crate::overlay::{CpuMaps, MapLoss, SplatQueue, SurfaceTotals, SurfaceTraces, Weatherable};
+use crate::overlay::{CpuMaps, MapLoss, Overlays, SplatQueue, SurfaceTotals, SurfaceTraces, Weatherable};
 use crate::particle::{ParticleCounts, Particles, Splashes, WaterCounts};
 use crate::weather::DryingClock;
 use crate::wetting::{DropQueue, SurfaceWater};
@@ -44,7 +44,7 @@ pub fn reset_scenario(world: &mut World) {
         if let Some(mut drops) = drops {
             drops.0.clear();
         }
-        // A changed surface gets new, empty maps on the GPU.
+        // A changed surface that has no maps on the GPU gets empty ones; those it has go below.
         surface.set_changed();
         queue.clear();
         queue.restore_traces(SurfaceTraces::default());
@@ -54,6 +54,10 @@ pub fn reset_scenario(world: &mut World) {
         if let Some(mut maps) = maps {
             *maps = CpuMaps::of_size(maps.size, maps.wrap);
         }
+    }
+    let mut mapped = world.query_filtered::<Entity, With<Overlays>>();
+    for surface in mapped.iter(world).collect::<Vec<_>>() {
+        world.entity_mut(surface).remove::<Overlays>();
     }
     world.resource_mut::<NewParticles>().restart();
     world.resource_mut::<WeatheringClock>().reset();

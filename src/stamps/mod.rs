@@ -18,10 +18,9 @@
 //!
 //! [`stamps()`] makes the variants of a kind side by side in a strip, and [`write_stamps`] keeps them in files. A
 //! [`StampSet`] takes such strips, or a user's, to what painters read: 64 by 64 texels, premultiplied, sampled in
-//! integers ([`sample`]).
+//! integers ([`sample`]); where a mark covers only a few texels of a map, from means of them ([`small`]).
 //!
-//! The same options give the same stamps on any machine: see `shapes.rs`. What this does not do: it paints nothing, and
-//! it makes no mip maps.
+//! The same options give the same stamps on any machine: see `shapes.rs`. What this does not do: it paints nothing.
 
 mod drop;
 mod dust;
@@ -33,6 +32,7 @@ mod read;
 mod runnel;
 pub mod sample;
 mod shapes;
+pub mod small;
 mod snow;
 
 use bevy::prelude::Reflect;

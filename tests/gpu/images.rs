@@ -5,10 +5,11 @@ use bevy::time::TimeUpdateStrategy;
 use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::material::{BaseBrdf, DryMaterial, Pores, PorousMaterial, TextureMeaning, WettingModel};
 use bevy_weathering::offscreen::Stage;
-use bevy_weathering::overlay::{OverlayUv, Overlays, Weatherable, Wrap};
+use bevy_weathering::overlay::{OverlayUv, Overlays, Splat, Weatherable, Wrap};
 use image::RgbImage;
 
-use super::app::{app, cover, picture, still, update, update_until};
+use super::app::{add_target, app, camera, cover, picture, still, update, update_until};
+use super::splat::{painted, push};
 
 const SIZE: UVec2 = UVec2::new(96, 72);
 
@@ -154,4 +155,48 @@ fn blinn_phong_is_another_picture_of_the_same_brightness() {
     let (average, _) = difference(&ggx, &phong);
     assert!(average > 0.1, "the switch does something: {average}");
     assert!((mean(&ggx) - mean(&phong)).abs() < 8.0, "{} and {}", mean(&ggx), mean(&phong));
+}
+
+#[test]
+fn what_is_painted_on_metal_is_no_metal() {
+    // A sheet, lit aslant, so that metal mirrors nothing to the eye; in its middle the paint covers all.
+    let draw = |metallic: f32, is_painted: bool| -> Option<RgbImage> {
+        let mut app = app()?;
+        let target = add_target(&mut app, SIZE);
+        let world = app.world_mut();
+        world.spawn(camera(&target, Vec3::Z * 2.0, Vec3::ZERO));
+        world.spawn((
+            DirectionalLight { illuminance: 6000.0, ..default() },
+            Transform::default().looking_to(Vec3::new(-1.0, 0.0, -0.4), Vec3::Y),
+        ));
+        let material = StandardMaterial { metallic, perceptual_roughness: 0.3, ..Color::WHITE.into() };
+        let material = world.resource_mut::<Assets<StandardMaterial>>().add(material);
+        let mesh = world.resource_mut::<Assets<Mesh>>().add(Rectangle::new(3.0, 3.0));
+        let maps = Weatherable { map_size: 64, uv: OverlayUv::Mesh, ..default() };
+        let sheet = world.spawn((Mesh3d(mesh), MeshMaterial3d(material), maps, instant())).id();
+        update_until(&mut app, "the maps and materials", |world| {
+            world.get::<Overlays>(sheet).is_some() && world.get::<DryMaterial>(sheet).is_some()
+        });
+        if is_painted {
+            let splat = Splat {
+                center: [32 * 256; 2],
+                radius: [63 * 128; 2],
+                tick: 1,
+                diffuse: 0xff40_8080,
+                ..bytemuck::Zeroable::zeroed()
+            };
+            push(&mut app, sheet, &[splat]);
+            painted(&mut app, 1);
+        }
+        update(&mut app);
+        Some(picture(&mut app, &target))
+    };
+    let Some(bare) = draw(1.0, false) else { return };
+    let [metal, stone] = [1.0, 0.0].map(|metallic| draw(metallic, true).unwrap());
+    let middle = |picture: &RgbImage| picture[(SIZE.x / 2, SIZE.y / 2)].0;
+    let (bare_red, metal_red, stone_red) = (middle(&bare)[0], middle(&metal)[0], middle(&stone)[0]);
+    if metal_red < bare_red.saturating_add(20) || metal_red.abs_diff(stone_red) > 4 {
+        keep("paint_on_metal", &[("bare", &bare), ("metal", &metal), ("stone", &stone)]);
+        panic!("red is {bare_red} on bare metal, {metal_red} painted, {stone_red} painted on stone");
+    }
 }

@@ -116,6 +116,27 @@ fn more_rain_is_more_ripples() {
 }
 
 #[test]
+fn rain_does_not_ripple_the_film_on_a_wall() {
+    let material = StandardMaterial { base_color: Color::linear_rgb(0.01, 0.01, 0.01), ..default() };
+    let (eye, sun) = (Vec3::new(0.0, -1.0, 1.6), Vec3::new(-0.3, -0.4, -1.0));
+    for (turn, moves) in [(0.0, false), (-std::f32::consts::FRAC_PI_2, true)] {
+        // A wall and, for comparison, the same sheet on the ground, seen as steeply.
+        let turn = Quat::from_rotation_x(turn);
+        let sheet = Mesh::from(Rectangle::new(2.0, 2.0)).rotated_by(turn);
+        let Some(mut scene) = Scene::new(sheet, turn * eye, turn * sun, 12_000.0, material.clone()) else {
+            return;
+        };
+        let flood = Flood::Accumulation { cracks: 0.0, puddles: 0.0 };
+        scene.set((still(0.0), StandingWater { flood, rain_mm_per_h: 25.0, ..default() }));
+        cover(&mut scene.app, scene.surface, 2.0, 0.0);
+        scene.run(3);
+        let (before, after) = (scene.after(1), scene.after(9));
+        let (average, _) = difference(&before, &after);
+        assert_eq!(average > 0.05, moves, "{average}");
+    }
+}
+
+#[test]
 fn a_drop_that_really_falls_sends_out_a_ring_that_dies() {
     let Some(mut scene) = above(ground()) else { return };
     scene.set(StandingWater { flood: DEEP, ..default() });

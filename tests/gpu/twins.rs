@@ -129,6 +129,14 @@ const TWINS: &[Twin] = &[
         rust: |x| matter::snow_albedo(x[0], 0.3 + 0.69 * x[1], 40.0 * x[2]),
     },
     Twin {
+        // A step at 0: what is near it is left out, single precision decides otherwise there.
+        wgsl: "matter::heap_fall(x[0] - 0.3, x[1], x[2] - 0.3) * f32(abs(x[0] - 0.3) > 1e-4 && abs(x[2] - 0.3) > 1e-4)",
+        rust: |x| {
+            let away = (x[0] - 0.3).abs() > 1e-4 && (x[2] - 0.3).abs() > 1e-4;
+            matter::heap_fall(x[0] - 0.3, x[1], x[2] - 0.3) * f64::from(u8::from(away))
+        },
+    },
+    Twin {
         wgsl: "matter::roughness_under(x[0], x[1], x[2])",
         rust: |x| matter::roughness_under(x[0], x[1], x[2]),
     },

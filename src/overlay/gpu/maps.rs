@@ -112,16 +112,22 @@ fn overlay_image(size: u32, wrap: [Wrap; 2], name: &'static str) -> Image {
     image
 }
 
-/// Gives new surfaces their maps, and new ones when their size or edges change.
+/// Gives new surfaces their maps, and new ones when their size or edges change. Whatever else is edited leaves what has been
+/// painted.
 pub(super) fn add_overlays(
     mut commands: Commands,
     mut images: ResMut<Assets<Image>>,
     mut buffers: ResMut<Assets<ShaderBuffer>>,
-    changed: Query<(Entity, &Weatherable, &MapSize), Or<(Changed<Weatherable>, Changed<MapSize>)>>,
+    changed: Query<
+        (Entity, &Weatherable, &MapSize, Option<&Overlays>),
+        Or<(Changed<Weatherable>, Changed<MapSize>)>,
+    >,
 ) {
-    for (entity, surface, size) in &changed {
-        let overlays = Overlays::new(size.texels(), surface.wrap(), &mut images, &mut buffers);
-        commands.entity(entity).insert(overlays);
+    for (entity, surface, size, maps) in &changed {
+        let (size, wrap) = (size.texels(), surface.wrap());
+        if maps.is_none_or(|maps| (maps.size, maps.wrap) != (size, wrap)) {
+            commands.entity(entity).insert(Overlays::new(size, wrap, &mut images, &mut buffers));
+        }
     }
 }
 
@@ -141,4 +147,45 @@ pub(super) fn open_overlays(
 /// Drops the maps of a surface that has lost its size.
 pub(super) fn release_overlays(removed: On<Remove, MapSize>, mut commands: Commands) {
     commands.entity(removed.entity).try_remove::<Overlays>();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::overlay::StampSpace;
+
+    #[test]
+    fn only_another_size_or_other_edges_cost_what_has_been_painted() {
+        let mut world = World::new();
+        world.init_resource::<Assets<Image>>();
+        world.init_resource::<Assets<ShaderBuffer>>();
+        let of_size = |map_size| Weatherable { map_size, ..default() };
+        let surface = world.spawn((of_size(64), MapSize::whole(&of_size(64)))).id();
+        let mut schedule = Schedule::default();
+        schedule.add_systems(add_overlays);
+        let mut after = |edit: &dyn Fn(&mut World)| {
+            edit(&mut world);
+            schedule.run(&mut world);
+            world.get::<Overlays>(surface).unwrap().rings.id()
+        };
+        let first = after(&|_| {});
+        let same = after(&|world| {
+            let mut edited = world.get_mut::<Weatherable>(surface).unwrap();
+            edited.stamps = StampSpace::Map;
+            world.get_mut::<MapSize>(surface).unwrap().set_changed();
+        });
+        assert_eq!(first, same);
+        let wrapped = after(&|world| world.get_mut::<Weatherable>(surface).unwrap().wrap_u = Wrap::Clamp);
+        assert_ne!(first, wrapped);
+        let larger = after(&|world| {
+            world.entity_mut(surface).insert(MapSize::whole(&of_size(128)));
+        });
+        assert_ne!(wrapped, larger);
+        // As when a scene is taken back to its beginning.
+        let emptied = after(&|world| {
+            world.entity_mut(surface).remove::<Overlays>();
+            world.get_mut::<Weatherable>(surface).unwrap().set_changed();
+        });
+        assert_ne!(larger, emptied);
+    }
 }
