@@ -59,6 +59,8 @@ mod overload;
 mod pool;
 /// Skinned meshes in their pose.
 mod posed;
+/// Sessions that are recorded, gone back in and replayed.
+mod record;
 /// What they refuse.
 mod refusals;
 /// The program as its users run it: output, errors, exit codes.
