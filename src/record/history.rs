@@ -24,10 +24,6 @@ impl History {
     /// The most moments.
     pub(super) const MOST: usize = 200;
 
-    pub(super) fn has(&self, tick: u32) -> bool {
-        self.moments.binary_search_by_key(&tick, |moment| moment.tick).is_ok()
-    }
-
     /// The last one at or before a tick.
     pub(super) fn before(&self, tick: u32) -> Option<&SavedScene> {
         let count = self.moments.partition_point(|moment| moment.tick <= tick);

@@ -14,6 +14,7 @@ use crate::clock::WeatheringClock;
 use crate::effect::WeatherEffect;
 use crate::emitter::EmissionDetail;
 use crate::matter::SurfaceMatter;
+use crate::save::SavedScene;
 use crate::scenario::{
     Action, BrushEvent, Digest, EventSpec, LoadedScenario, Scenario, ScenarioStatus, ScenarioSurface,
     WeatherChange, amounts_digest, beginning_of, check_weather, exchange_events, tick_from,
@@ -128,8 +129,10 @@ impl Recording {
 
     /// Whether a moment should be kept before the next tick; see [`keep_moment`](super::keep_moment).
     pub fn wants_moment(&self) -> bool {
-        let every = Self::MOMENT_SECONDS * self.hz();
-        self.is_live() && self.tick > 0 && self.tick.is_multiple_of(every) && !self.history.has(self.tick)
+        let every = Self::MOMENT_SECONDS.saturating_mul(self.hz());
+        // The start needs none.
+        let last = self.history.before(self.tick).map_or(0, SavedScene::tick);
+        self.is_live() && self.tick.saturating_sub(last) >= every
     }
 
     /// Records something that is not found by itself: where the camera is. What acts on the scene is left to those who do it
@@ -246,7 +249,7 @@ impl Recording {
     /// Lets things happen in a tick, and from then on be recorded.
     fn record(&mut self, world: &mut World, tick: u32, actions: Vec<Action>) {
         let at = beginning_of(tick, self.hz());
-        let mut is_past = !self.is_at_end();
+        let mut is_past = tick <= self.end;
         for what in actions {
             let event = EventSpec { at, what };
             if let Err(error) = self.loaded.validate_event("events[_]", &event) {

@@ -172,7 +172,7 @@ impl Watched {
     /// What is wrong with the scene: it has what no scenario has.
     pub(super) fn look_for_strangers(&self, world: &mut World, complaints: &mut Complaints) {
         let mut emitters = world.query::<(Entity, &Emitter)>();
-        let is_ours = |entity| self.emitters.iter().any(|watched| watched.entity == entity);
+        let is_ours = |entity: Entity| self.emitters.iter().any(|watched| watched.entity == entity);
         if emitters.iter(world).any(|(entity, emitter)| emitter.enabled && !is_ours(entity)) {
             complaints.flaws.push("an emitter that is not the scenario's was on");
         }

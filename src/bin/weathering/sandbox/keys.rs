@@ -24,6 +24,7 @@ const KEYS: &[(&str, &str)] = &[
     ("R", "start over"),
     ("U", "hide panels, show them"),
     ("M, P", "maps, plots"),
+    ("F9", "record a session; write it and end"),
     ("F12", "picture without panels"),
     ("F11", "begin, end a sequence of pictures"),
     ("? or F1", "this list"),

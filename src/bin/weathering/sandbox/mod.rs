@@ -15,6 +15,7 @@ mod open;
 mod pace;
 mod plots;
 mod probe;
+mod record;
 mod saving;
 mod scenes;
 mod selection;
@@ -85,7 +86,14 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
         .add_plugins((ui::plugin, settings::plugin, selection::plugin, camera::plugin))
         // In the order of their panels.
         .add_plugins((hose_and_time, scene_panels))
-        .add_plugins((keys::plugin, title::plugin, open::plugin, model::plugin, saving::plugin))
+        .add_plugins((
+            keys::plugin,
+            title::plugin,
+            open::plugin,
+            model::plugin,
+            saving::plugin,
+            record::plugin,
+        ))
         .add_systems(PreUpdate, spare_software_renderers)
         .add_systems(Update, tell_of_reloads)
         .run();

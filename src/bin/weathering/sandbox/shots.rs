@@ -36,7 +36,7 @@ pub fn plugin(app: &mut App) {
 }
 
 /// The first of `name_000.png`, `name_001.png`, ... (or folders of that name) that is not there yet.
-fn free_name(folder: &Path, name: &str, extension: &str) -> PathBuf {
+pub fn free_name(folder: &Path, name: &str, extension: &str) -> PathBuf {
     let mut number = 0;
     loop {
         let path = folder.join(format!("{name}_{number:03}{extension}"));
@@ -124,6 +124,8 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     ui.small(format!("into {}", world.resource::<OutFolder>().0.display()));
     ui.separator();
     super::saving::show(ui, world);
+    ui.separator();
+    super::record::show(ui, world);
 }
 
 #[cfg(test)]
