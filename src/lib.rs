@@ -32,6 +32,7 @@ pub mod overlay;
 pub mod overload;
 pub mod particle;
 pub mod picture;
+pub mod record;
 pub mod replay;
 pub mod save;
 pub mod scenario;

@@ -82,6 +82,8 @@ mod overload;
 mod pool;
 /// Skinned meshes in their pose.
 mod posed;
+/// Sessions that are recorded, gone back in and replayed.
+mod record;
 /// What they refuse.
 mod refusals;
 /// Files of effects that change while they are in use.

@@ -14,11 +14,13 @@ pub struct EmissionDetail {
     factor: f32,
     /// Part of a particle that may be sent on top, 0..1.
     credit: f64,
+    /// The factor stays 1, whoever steers it.
+    is_fixed: bool,
 }
 
 impl Default for EmissionDetail {
     fn default() -> Self {
-        Self { factor: 1.0, credit: 0.0 }
+        Self { factor: 1.0, credit: 0.0, is_fixed: false }
     }
 }
 
@@ -31,9 +33,17 @@ impl EmissionDetail {
         self.factor
     }
 
-    /// Sets the part; clamped to [`Self::LEAST`]..=1, and 1 if it is no number.
+    /// Sets the part; clamped to [`Self::LEAST`]..=1, and 1 if it is no number. While the detail is [fixed](Self::fix), nothing
+    /// happens.
     pub fn set_factor(&mut self, factor: f32) {
-        self.factor = if factor.is_nan() { 1.0 } else { factor.clamp(Self::LEAST, 1.0) };
+        let factor = if factor.is_nan() { 1.0 } else { factor.clamp(Self::LEAST, 1.0) };
+        self.factor = if self.is_fixed { 1.0 } else { factor };
+    }
+
+    /// Full detail from now on, whoever steers it, or free again: what must come out the same elsewhere cannot depend on how
+    /// fast a machine is.
+    pub fn fix(&mut self, is_fixed: bool) {
+        *self = Self { is_fixed, ..Self::default() };
     }
 
     /// Of so many particles, how many may be sent in this tick; what is below a whole one goes to the next tick.
@@ -125,5 +135,18 @@ mod tests {
         assert_eq!(detail.factor(), EmissionDetail::LEAST);
         detail.set_factor(f32::NAN);
         assert_eq!(detail.factor(), 1.0);
+    }
+
+    #[test]
+    fn fixed_detail_is_full_until_it_is_free() {
+        let mut detail = EmissionDetail::default();
+        detail.set_factor(0.1);
+        detail.allow(3);
+        detail.fix(true);
+        detail.set_factor(0.1);
+        assert_eq!((detail.factor(), detail.allow(3)), (1.0, 3));
+        detail.fix(false);
+        detail.set_factor(0.5);
+        assert_eq!(detail.factor(), 0.5);
     }
 }

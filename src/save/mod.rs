@@ -218,4 +218,17 @@ impl SavedScene {
     pub fn tick(&self) -> u32 {
         self.state.tick
     }
+
+    /// Bytes that it takes in memory, about.
+    pub fn bytes(&self) -> usize {
+        let of = |ColorMaps { diffuse, specular, normal }: &ColorMaps| {
+            diffuse.len() + specular.len() + normal.len()
+        };
+        let surfaces = self.surfaces.iter();
+        let maps: usize = surfaces
+            .map(|surface| surface.water.bytes() + surface.matter.bytes() + of(&surface.colors))
+            .sum();
+        let particles = self.state.particles.len() + self.state.waiting.len();
+        maps + particles * size_of::<SavedParticle>()
+    }
 }

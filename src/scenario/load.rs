@@ -32,7 +32,7 @@ pub struct LoadedScenario {
 }
 
 /// How scenarios are written: an optional value without `Some`, a variant's fields without a second pair of brackets.
-pub(super) fn ron_options() -> Options {
+pub(crate) fn ron_options() -> Options {
     Options::default().with_default_extension(Extensions::IMPLICIT_SOME | Extensions::UNWRAP_VARIANT_NEWTYPES)
 }
 

@@ -112,6 +112,7 @@ impl Merged {
             part.events.push(event);
             origins.events.push(origin(format!("events[{index}]")));
         }
+        part.flaws.extend(over.flaws);
         for (name, change) in over.emitter_changes {
             let Some(index) = part.emitters.iter().position(|emitter| emitter.name == name) else {
                 return Err(name);

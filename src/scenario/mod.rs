@@ -33,6 +33,7 @@ pub use content::SurfaceMesh;
 pub use digest::{Digest, amounts_digest};
 pub use error::ScenarioError;
 pub use load::LoadedScenario;
+pub(crate) use load::ron_options;
 pub use motion::{ByHand, ScenarioCamera};
 pub use reset::reset_scenario;
 pub use schema::schema_json;
@@ -44,8 +45,8 @@ pub use schema::{
 pub use spawn::{AssetTree, ScenarioPlugin, ScenarioStatus, ScenarioSurface, SceneEntity};
 pub use switch::{PreparedScenario, switch_scenario};
 pub use timeline::{
-    Action, BrushEvent, CameraMove, EmitterMove, EventSpec, Expectation, ExpectationOutcome, Expectations,
-    MaterialChange, Quantity, WeatherChange,
+    Action, BrushEvent, CameraMove, EmitterAdjustment, EmitterMove, EventSpec, Expectation,
+    ExpectationOutcome, Expectations, MaterialChange, Quantity, WeatherChange,
 };
-pub(crate) use timeline::{captures, rewind};
+pub(crate) use timeline::{beginning_of, captures, exchange_events, rewind, tick_from, weather_is_changing};
 pub(crate) use validate::check_weather;

@@ -10,10 +10,30 @@ use crate::emitter::Emitter;
 #[derive(Component, Debug)]
 pub(super) struct EmitterMotion {
     pub(super) keys: Vec<EmitterKey>,
+    /// In order of time; from the first on `keys` are not looked at.
+    pub(super) legs: Vec<Leg>,
     pub(super) start: f32,
     pub(super) stop: f32,
     /// The first ticks in which it is on, or off, in order; in place of `start` and `stop` if there are any.
     pub(super) switches: Vec<(u32, bool)>,
+}
+
+/// A way of an emitter, from one key to another, where it stays.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Leg {
+    pub(super) from: EmitterKey,
+    pub(super) to: EmitterKey,
+}
+
+/// Position and target of an emitter at a time: on the last leg that begins before, or, before the first one, by its keys.
+pub(super) fn pose(keys: &[EmitterKey], legs: &[Leg], t: f32) -> Option<(Vec3, Vec3)> {
+    let begun = legs.partition_point(|leg| leg.from.t < t);
+    let time = |key: &EmitterKey| key.t;
+    let (from, to, part) = match begun.checked_sub(1).and_then(|last| legs.get(last)) {
+        Some(leg) => between(&[leg.from, leg.to], time, t),
+        None => between(keys, time, t),
+    }?;
+    Some((from.position.lerp(to.position, part), from.target.lerp(to.target, part)))
 }
 
 impl EmitterMotion {
@@ -72,8 +92,8 @@ pub(super) fn move_emitters(
     let t = clock.seconds() as f32;
     for (motion, mut emitter, mut transform, mut global) in &mut emitters {
         emitter.enabled = motion.is_on(&clock);
-        if let Some((from, to, part)) = between(&motion.keys, |key| key.t, t) {
-            *transform = look(from.position.lerp(to.position, part), from.target.lerp(to.target, part));
+        if let Some((position, target)) = pose(&motion.keys, &motion.legs, t) {
+            *transform = look(position, target);
             *global = GlobalTransform::from(*transform);
         }
     }
@@ -114,7 +134,8 @@ mod tests {
     #[test]
     fn switches_take_the_place_of_hours() {
         let on = |switches: &[(u32, bool)]| {
-            let motion = EmitterMotion { keys: vec![], start: 0.0, stop: 1.0, switches: switches.to_vec() };
+            let switches = switches.to_vec();
+            let motion = EmitterMotion { keys: vec![], legs: vec![], start: 0.0, stop: 1.0, switches };
             let mut clock = WeatheringClock::new(2);
             [(); 5].map(|()| {
                 clock.advance();
@@ -131,7 +152,8 @@ mod tests {
     fn emitters_work_their_hours_and_point_where_they_should() {
         let mut world = World::new();
         world.insert_resource(WeatheringClock::new(2));
-        let motion = EmitterMotion { keys: vec![key(0.0, 4.0)], start: 1.0, stop: 2.0, switches: vec![] };
+        let (keys, legs, switches) = (vec![key(0.0, 4.0)], vec![], vec![]);
+        let motion = EmitterMotion { keys, legs, start: 1.0, stop: 2.0, switches };
         let emitter = world.spawn((motion, Emitter::default(), GlobalTransform::default())).id();
         let mut schedule = Schedule::default();
         schedule.add_systems(move_emitters);

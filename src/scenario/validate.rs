@@ -255,7 +255,7 @@ impl LoadedScenario {
         Ok(triangles)
     }
 
-    fn validate_emitter(&self, field: &str, emitter: &EmitterSpec) -> Result<(), ScenarioError> {
+    pub(super) fn validate_emitter(&self, field: &str, emitter: &EmitterSpec) -> Result<(), ScenarioError> {
         self.resolve(&format!("{field}.effect"), &emitter.effect)?;
         self.not_negative(&format!("{field}.rate"), emitter.rate, Scenario::MAX_RATE)?;
         self.not_negative(&format!("{field}.speed"), emitter.initial_speed(), 1000.0)?;

@@ -63,6 +63,13 @@ fn summary(loaded: &LoadedScenario) -> Result<String, ScenarioError> {
         let kinds: Vec<_> = kinds.iter().map(|(kind, count)| format!("{kind} {count}")).collect();
         parts.push(format!("{} ({})", counted(scenario.events.len(), "event", "events"), kinds.join(", ")));
     }
+    if !scenario.flaws.is_empty() {
+        parts.push(format!(
+            "recorded with {}: {}",
+            counted(scenario.flaws.len(), "flaw", "flaws"),
+            scenario.flaws.join("; ")
+        ));
+    }
     if !loaded.included.is_empty() {
         parts.push(format!("{} included", counted(loaded.included.len(), "file", "files")));
     }

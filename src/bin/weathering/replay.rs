@@ -42,6 +42,9 @@ fn run_one(file: &Path, arguments: &ReplayArgs) -> Result<ExitCode, Box<dyn Erro
         export: arguments.export.clone(),
         ..ReplayOptions::new(Scenario::load_variant(file, arguments.variant.as_deref())?)
     };
+    for flaw in &options.scenario.scenario.flaws {
+        eprintln!("warning: the recorded session comes out differently: {flaw}");
+    }
     let bar = ProgressBar::no_length().with_style(
         ProgressStyle::with_template("{bar:40} tick {pos}/{len}, {elapsed} gone, {eta} to go")
             .unwrap_or_else(|_| ProgressStyle::default_bar()),

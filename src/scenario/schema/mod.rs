@@ -65,6 +65,9 @@ pub struct Scenario {
     /// What happens when, at most [`Self::MAX_EVENTS`]. In any order; of those at the same time the first comes first.
     #[serde(default)]
     pub events: Vec<EventSpec>,
+    /// Of a recorded session: what was done in it that events cannot say, so that a replay comes out differently.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub flaws: Vec<String>,
 }
 
 impl Scenario {

@@ -17,7 +17,7 @@ use crate::scenario::EventSpec;
 /// Parts are laid over each other: the included files in their order, then the file itself, then one of its variants. A
 /// later `seed`, `tick_hz`, `seconds`, `gravity`, `wind`, `max_particles`, `map_budget`, `camera`, `sun` or `environment` replaces an
 /// earlier one, `weather` field by field; materials, variants, surfaces and emitters replace those of the same name and
-/// else come behind the others; `emitter_changes` are made to what is there by then; events are added. Nothing can be taken
+/// else come behind the others; `emitter_changes` are made to what is there by then; events and flaws are added. Nothing can be taken
 /// away.
 #[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, PartialEq, Default)]
 #[serde(deny_unknown_fields, default)]
@@ -60,6 +60,9 @@ pub struct ScenarioPart {
     pub emitter_changes: BTreeMap<String, EmitterChange>,
     /// What happens when. In any order; of those at the same time the first comes first.
     pub events: Vec<EventSpec>,
+    /// Of a recorded session: what was done in it that events cannot say, so that a replay comes out differently. Replays and
+    /// checks tell it.
+    pub flaws: Vec<String>,
 }
 
 /// What of the weather a part says.
@@ -157,6 +160,7 @@ impl ScenarioPart {
             surfaces: self.surfaces,
             emitters: self.emitters,
             events: self.events,
+            flaws: self.flaws,
         })
     }
 }

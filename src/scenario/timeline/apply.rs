@@ -2,12 +2,13 @@
 
 use bevy::prelude::*;
 
-use super::{Expectations, MaterialStep, Timeline, due, expect};
+use super::{Expectations, MaterialStep, Timeline, due, emitter_motion, expect};
 use crate::brush::{BrushQueue, Stroke, paint_strokes};
 use crate::clock::WeatheringClock;
+use crate::emitter::Emitter;
 use crate::material::WettingTextures;
-use crate::scenario::motion::move_emitters;
-use crate::scenario::{Digest, Scenario, ScenarioSurface, digest};
+use crate::scenario::motion::{ByHand, EmitterMotion, move_emitters};
+use crate::scenario::{Digest, EmitterSpec, Scenario, ScenarioSurface, digest};
 use crate::schedule::{WeatheringSystems, WeatheringTick};
 use crate::weather::Weather;
 use crate::wetting::{ExchangeMatter, put_matter};
@@ -24,6 +25,18 @@ pub(in crate::scenario) fn insert_events(world: &mut World, scenario: &Scenario)
     world.insert_resource(Expectations::new(scenario));
 }
 
+/// Lets other events happen from the next tick on, in the scenario that runs. What has acted so far must be the same in
+/// both. Expectations stay what they were.
+pub(crate) fn exchange_events(world: &mut World, scenario: &Scenario) {
+    world.insert_resource(Timeline::new(scenario));
+    let mut emitters = world.query::<(&Emitter, &mut EmitterMotion)>();
+    for (emitter, mut motion) in emitters.iter_mut(world) {
+        if let Some(spec) = scenario.emitters.get(emitter.stream as usize) {
+            *motion = emitter_motion(scenario, spec);
+        }
+    }
+}
+
 /// Lets happen what [`insert_events`] says.
 pub(in crate::scenario) fn apply_events_plugin(app: &mut App) {
     app.init_resource::<MaterialHandles>()
@@ -32,6 +45,7 @@ pub(in crate::scenario) fn apply_events_plugin(app: &mut App) {
             (
                 // Emitters stand where they should before they emit.
                 move_emitters,
+                adjust_emitters,
                 change_weather,
                 exchange_materials,
                 queue_strokes,
@@ -46,6 +60,28 @@ pub(in crate::scenario) fn apply_events_plugin(app: &mut App) {
             WeatheringTick,
             (digest::digest_impacts, expect::look).chain().in_set(WeatheringSystems::Last),
         );
+}
+
+/// Makes an emitter what it should be, but for its effect.
+fn adjust(emitter: &mut Emitter, spec: &EmitterSpec) {
+    emitter.rate = spec.rate;
+    emitter.shape = spec.shape;
+    emitter.flow = spec.flow;
+    emitter.speed = spec.initial_speed();
+    emitter.spread = spec.spread_deg.to_radians();
+    emitter.lifetime = spec.lifetime;
+}
+
+fn adjust_emitters(
+    timeline: Res<Timeline>,
+    clock: Res<WeatheringClock>,
+    mut emitters: Query<&mut Emitter, (With<EmitterMotion>, Without<ByHand>)>,
+) {
+    for step in due(&timeline.emitters, clock.tick(), |step| step.tick) {
+        if let Some(mut emitter) = emitters.iter_mut().find(|emitter| emitter.stream == step.emitter) {
+            adjust(&mut emitter, &step.spec);
+        }
+    }
 }
 
 /// Whatever else changes the weather between events may do so.
@@ -141,7 +177,7 @@ fn digest_events(timeline: Res<Timeline>, clock: Res<WeatheringClock>, mut diges
     digest.0 = *hasher.finalize().as_bytes();
 }
 
-/// Makes surfaces what they are made of at a tick that is gone to, and the weather that of the start if it is 0. For runs
+/// Makes surfaces and emitters what they are at a tick that is gone to, and the weather that of the start if it is 0. For runs
 /// that are started over or gone on with; their water and their weather are somebody else's to put back.
 pub(crate) fn rewind(world: &mut World, tick: u32) {
     let Some(timeline) = world.get_resource::<Timeline>().cloned() else { return };
@@ -153,6 +189,14 @@ pub(crate) fn rewind(world: &mut World, tick: u32) {
     }
     if let Some(mut expectations) = world.get_resource_mut::<Expectations>() {
         expectations.forget();
+    }
+    let mut emitters = world.query_filtered::<&mut Emitter, (With<EmitterMotion>, Without<ByHand>)>();
+    for mut emitter in emitters.iter_mut(world) {
+        let stream = emitter.stream;
+        let mut past = timeline.emitters.iter().rev().filter(|step| step.tick <= tick);
+        if let Some(step) = past.find(|step| step.emitter == stream) {
+            adjust(&mut emitter, &step.spec);
+        }
     }
     let mut surfaces = world.query::<(Entity, &ScenarioSurface)>();
     let surfaces: Vec<_> = surfaces.iter(world).map(|(entity, surface)| (entity, surface.index)).collect();

@@ -3,8 +3,10 @@
 use std::collections::BTreeSet;
 
 use super::{
-    Action, BrushEvent, EmitterMove, Expectation, MaterialChange, Quantity, WeatherStep, in_order, tick_from,
+    Action, BrushEvent, EmitterAdjustment, EmitterMove, EventSpec, Expectation, MaterialChange, Quantity,
+    WeatherStep, in_order, tick_from,
 };
+use crate::material::PorousMaterial;
 use crate::scenario::validate::{FAR, check_weather};
 use crate::scenario::{LoadedScenario, Scenario, ScenarioError};
 
@@ -22,26 +24,35 @@ impl LoadedScenario {
         let mut pictures = BTreeSet::new();
         for (index, event) in scenario.events.iter().enumerate() {
             let field = format!("events[{index}]");
-            self.range(&format!("{field}.at"), event.at, 0.0, f64::from(scenario.seconds))?;
-            let field = format!("{field}.what.{}", event.what.kind());
-            match &event.what {
-                Action::Start(name) | Action::Stop(name) => self.validate_switch(&field, name)?,
-                Action::Move(step) => self.validate_move(&field, step)?,
-                // In order of time, below.
-                Action::Weather(_) => {}
-                Action::Camera(step) => self.look(&field, "eye", step.eye, step.target)?,
-                Action::Brush(brush) => self.validate_brush(&field, brush)?,
-                Action::Material(change) => self.validate_material_change(&field, change)?,
-                Action::Capture(name) => {
-                    self.file_name(&field, name)?;
-                    if !pictures.insert(name) {
-                        return Err(self.value(field, name, "unique"));
-                    }
-                }
-                Action::Expect(expectation) => self.validate_expectation(&field, expectation)?,
+            self.validate_event(&field, event)?;
+            if let Action::Capture(name) = &event.what
+                && !pictures.insert(name)
+            {
+                return Err(self.value(format!("{field}.what.Capture"), name, "unique"));
             }
         }
         self.validate_weather_changes()
+    }
+
+    /// Checks an event by itself; what of the weather depends on the changes before it is not looked at.
+    ///
+    /// # Errors
+    /// [`ScenarioError`].
+    pub(crate) fn validate_event(&self, field: &str, event: &EventSpec) -> Result<(), ScenarioError> {
+        self.range(&format!("{field}.at"), event.at, 0.0, f64::from(self.scenario.seconds))?;
+        let field = format!("{field}.what.{}", event.what.kind());
+        match &event.what {
+            Action::Start(name) | Action::Stop(name) => self.validate_switch(&field, name),
+            Action::Move(step) => self.validate_move(&field, step),
+            Action::Adjust(adjustment) => self.validate_adjustment(&field, adjustment),
+            // In order of time, below.
+            Action::Weather(_) => Ok(()),
+            Action::Camera(step) => self.look(&field, "eye", step.eye, step.target),
+            Action::Brush(brush) => self.validate_brush(&field, brush),
+            Action::Material(change) => self.validate_material_change(&field, change),
+            Action::Capture(name) => self.file_name(&field, name),
+            Action::Expect(expectation) => self.validate_expectation(&field, expectation),
+        }
     }
 
     /// It becomes part of the names of files.
@@ -90,6 +101,16 @@ impl LoadedScenario {
         self.not_negative(&format!("{field}.over"), step.over, Scenario::MAX_SECONDS)
     }
 
+    fn validate_adjustment(&self, field: &str, adjustment: &EmitterAdjustment) -> Result<(), ScenarioError> {
+        let index = self.one_emitter(&format!("{field}.emitter"), &adjustment.emitter)?;
+        if adjustment.is_empty() {
+            return Err(self.value(format!("{field}.rate"), "not given", "given, or another number"));
+        }
+        let mut emitter = self.scenario.emitters[index].clone();
+        adjustment.make(&mut emitter);
+        self.validate_emitter(field, &emitter)
+    }
+
     fn validate_brush(&self, field: &str, event: &BrushEvent) -> Result<(), ScenarioError> {
         if let Some(name) = &event.surface {
             self.one_surface(&format!("{field}.surface"), name)?;
@@ -100,16 +121,23 @@ impl LoadedScenario {
 
     fn validate_material_change(&self, field: &str, change: &MaterialChange) -> Result<(), ScenarioError> {
         self.one_surface(&format!("{field}.surface"), &change.surface)?;
-        if change.material.is_none() && change.model.is_none() {
-            return Err(self.value(format!("{field}.material"), "not given", "given, or `model`"));
+        let MaterialChange { material, porous, model, water, .. } = change;
+        if material.is_none() && porous.is_none() && model.is_none() && water.is_none() {
+            let expected = "given, or `porous`, `model` or `water`";
+            return Err(self.value(format!("{field}.material"), "not given", expected));
         }
         if let Some(name) = &change.material
             && !self.scenario.materials.contains_key(name)
         {
             return Err(self.value(format!("{field}.material"), name, "the name of a material"));
         }
-        let model = change.model.unwrap_or_default();
-        let wears = crate::material::PorousMaterial { model, ..Default::default() };
+        if let Some(porous) = porous {
+            porous.validate().map_err(|wrong| self.out_of_range(&format!("{field}.porous"), wrong))?;
+        }
+        if let Some(water) = water {
+            water.validate().map_err(|wrong| self.out_of_range(&format!("{field}.water"), wrong))?;
+        }
+        let wears = PorousMaterial { model: model.unwrap_or_default(), ..Default::default() };
         wears.validate().map_err(|wrong| self.out_of_range(field, wrong))
     }
 
@@ -206,6 +234,8 @@ mod tests {
             (at: 2.0, what: Camera(eye: (0.0, 1.0, 1.0), target: (0.0, 0.0, 0.0))),
             (at: 2.0, what: Brush(kind: Wet, point: (0.0, 0.0, 0.0), radius: 0.1, strength: 0.5)),
             (at: 3.0, what: Material(surface: "a", model: Twomey())),
+            (at: 3.0, what: Material(surface: "a", porous: (capacity_mm: 0.3), water: (rain_mm_per_h: 2.0))),
+            (at: 3.0, what: Adjust(emitter: "hose", rate: 20.0, spread_deg: 4.0)),
             (at: 5.0, what: Capture("five")),
             (at: 5.0, what: Expect(quantity: WetFraction, surface: "a", above: 0.0, below: 0.5)),
             (at: 5.0, what: Expect(quantity: Particles, below: 100.0)),
@@ -250,6 +280,17 @@ mod tests {
             (
                 r#"(at: 1.0, what: Material(surface: "a", model: Lagarde(porosity: 2.0)))"#,
                 "events[0].what.Material.model.porosity",
+            ),
+            (
+                r#"(at: 1.0, what: Material(surface: "a", porous: (capacity_mm: -1.0)))"#,
+                "events[0].what.Material.porous.capacity_mm",
+            ),
+            (r#"(at: 1.0, what: Adjust(emitter: "snow", rate: 1.0))"#, "events[0].what.Adjust.emitter"),
+            (r#"(at: 1.0, what: Adjust(emitter: "rain"))"#, "events[0].what.Adjust.rate"),
+            (r#"(at: 1.0, what: Adjust(emitter: "rain", rate: -1.0))"#, "events[0].what.Adjust.rate"),
+            (
+                r#"(at: 1.0, what: Adjust(emitter: "rain", flow: MmPerHour(2.0)))"#,
+                "events[0].what.Adjust.flow",
             ),
             (r#"(at: 1.0, what: Capture("../a"))"#, "events[0].what.Capture"),
             (r#"(at: 1.0, what: Capture("a")), (at: 2.0, what: Capture("a"))"#, "events[1].what.Capture"),

@@ -7,7 +7,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::brush::{Brush, BrushKind};
-use crate::material::WettingModel;
+use crate::emitter::{EmitterShape, Flow};
+use crate::material::{PorousMaterial, StandingWater, WettingModel};
+use crate::scenario::EmitterSpec;
 
 /// Something that happens at a time.
 #[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, PartialEq)]
@@ -29,6 +31,8 @@ pub enum Action {
     Stop(String),
     /// An emitter goes somewhere else.
     Move(EmitterMove),
+    /// An emitter sends out more or less, or in another way.
+    Adjust(EmitterAdjustment),
     /// The weather changes.
     Weather(WeatherChange),
     /// The camera is here then.
@@ -50,6 +54,7 @@ impl Action {
             Self::Start(_) => "Start",
             Self::Stop(_) => "Stop",
             Self::Move(_) => "Move",
+            Self::Adjust(_) => "Adjust",
             Self::Weather(_) => "Weather",
             Self::Camera(_) => "Camera",
             Self::Brush(_) => "Brush",
@@ -80,6 +85,53 @@ pub struct EmitterMove {
     /// Seconds that it takes; 0 is at once.
     #[serde(default)]
     pub over: f32,
+}
+
+/// An emitter sends out more or less, or in another way. What is left out stays as it is; the fields are those of
+/// [`EmitterSpec`].
+#[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, PartialEq, Default)]
+#[serde(deny_unknown_fields)]
+pub struct EmitterAdjustment {
+    /// Its name.
+    pub emitter: String,
+    /// Particles per second.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate: Option<f32>,
+    /// How much it sends out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flow: Option<Flow>,
+    /// Where on it they start.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shape: Option<EmitterShape>,
+    /// m/s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub speed: Option<f32>,
+    /// Half-angle of the cone of directions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spread_deg: Option<f32>,
+    /// Seconds until a particle that hits nothing is removed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lifetime: Option<f32>,
+}
+
+impl EmitterAdjustment {
+    /// Whether it changes nothing.
+    pub fn is_empty(&self) -> bool {
+        let Self { emitter: _, rate, flow, shape, speed, spread_deg, lifetime } = self;
+        let numbers = [rate, speed, spread_deg, lifetime];
+        numbers.iter().all(|number| number.is_none()) && flow.is_none() && shape.is_none()
+    }
+
+    /// What the emitter is afterwards. A speed that followed from its flow stays what it was.
+    pub(in crate::scenario) fn make(&self, emitter: &mut EmitterSpec) {
+        let speed = emitter.initial_speed();
+        emitter.rate = self.rate.unwrap_or(emitter.rate);
+        emitter.flow = self.flow.unwrap_or(emitter.flow);
+        emitter.shape = self.shape.unwrap_or(emitter.shape);
+        emitter.speed = Some(self.speed.unwrap_or(speed));
+        emitter.spread_deg = self.spread_deg.unwrap_or(emitter.spread_deg);
+        emitter.lifetime = self.lifetime.unwrap_or(emitter.lifetime);
+    }
 }
 
 /// The weather changes. What is left out stays as it is.
@@ -138,7 +190,8 @@ impl BrushEvent {
     }
 }
 
-/// A surface becomes other matter, or looks wet another way. One of both, or both.
+/// A surface becomes other matter, or looks wet another way. One of them at least is given; a later field is laid over what
+/// those before it say.
 #[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialChange {
@@ -147,9 +200,15 @@ pub struct MaterialChange {
     /// The name of another material.
     #[serde(default)]
     pub material: Option<String>,
+    /// How it gets wet, in place of its material's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub porous: Option<PorousMaterial>,
     /// What water does to its look, in place of its material's own.
     #[serde(default)]
     pub model: Option<WettingModel>,
+    /// Water that stands on it, in place of its material's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub water: Option<StandingWater>,
 }
 
 /// Something that can be measured.
@@ -223,10 +282,26 @@ mod tests {
                 strength: 0.2,
                 surface: Some("ball".into()),
             }),
+            Action::Adjust(EmitterAdjustment {
+                emitter: "rain".into(),
+                rate: Some(0.1),
+                flow: Some(Flow::MmPerHour(3.3)),
+                shape: Some(EmitterShape::Point),
+                ..default()
+            }),
             Action::Material(MaterialChange {
                 surface: "ball".into(),
                 material: None,
+                porous: None,
                 model: Some(WettingModel::default()),
+                water: None,
+            }),
+            Action::Material(MaterialChange {
+                surface: "ball".into(),
+                material: None,
+                porous: Some(PorousMaterial { sorptivity: 0.7, ..default() }),
+                model: None,
+                water: Some(StandingWater::default()),
             }),
             Action::Capture("end".into()),
             Action::Expect(Expectation {

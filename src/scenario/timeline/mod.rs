@@ -15,20 +15,20 @@ mod expect;
 
 use bevy::prelude::*;
 
-use super::motion::{EmitterMotion, between};
+use super::motion::{EmitterMotion, Leg, pose};
 use super::{CameraKey, EmitterKey, EmitterSpec, Scenario};
 use crate::brush::Brush;
 use crate::material::{PorousMaterial, StandingWater};
 use crate::weather::Weather;
 
 pub use events::{
-    Action, BrushEvent, CameraMove, EmitterMove, EventSpec, Expectation, MaterialChange, Quantity,
-    WeatherChange,
+    Action, BrushEvent, CameraMove, EmitterAdjustment, EmitterMove, EventSpec, Expectation, MaterialChange,
+    Quantity, WeatherChange,
 };
 pub use expect::{ExpectationOutcome, Expectations};
 
-pub(crate) use apply::rewind;
 pub(super) use apply::{MaterialHandles, apply_events_plugin, insert_events};
+pub(crate) use apply::{exchange_events, rewind};
 
 /// How much of a tick a time may be off by rounding.
 const ROUNDING: f64 = 1.0e-6;
@@ -40,8 +40,13 @@ pub(crate) fn tick_at(seconds: f64, hz: u32) -> u32 {
 }
 
 /// The tick that is the first to begin at this second or later.
-pub(super) fn tick_from(seconds: f64, hz: u32) -> u32 {
+pub(crate) fn tick_from(seconds: f64, hz: u32) -> u32 {
     tick_at(seconds, hz).saturating_add(1)
+}
+
+/// The second at which a tick begins: what happens then happens in it.
+pub(crate) fn beginning_of(tick: u32, hz: u32) -> f64 {
+    f64::from(tick.saturating_sub(1)) / f64::from(hz)
 }
 
 /// Weather that changes from one tick to another.
@@ -69,6 +74,15 @@ struct MaterialStep {
     water: StandingWater,
 }
 
+/// What an emitter sends out from a tick on.
+#[derive(Debug, Clone, PartialEq)]
+struct EmitterStep {
+    tick: u32,
+    /// Its number.
+    emitter: u32,
+    spec: EmitterSpec,
+}
+
 /// A touch of a brush.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct BrushStep {
@@ -86,6 +100,8 @@ pub(super) struct Timeline {
     changes: Vec<WeatherStep>,
     /// Of surfaces that change at all, what they are made of at first comes with tick 0.
     materials: Vec<MaterialStep>,
+    /// Of emitters that are adjusted at all, what they are at first comes with tick 0.
+    emitters: Vec<EmitterStep>,
     strokes: Vec<BrushStep>,
     /// Hashes of all that acts.
     acts: Vec<(u32, [u8; 32])>,
@@ -103,6 +119,12 @@ fn in_order(scenario: &Scenario) -> Vec<(usize, &EventSpec)> {
     let mut events: Vec<_> = scenario.events.iter().enumerate().collect();
     events.sort_by(|(_, a), (_, b)| a.at.total_cmp(&b.at));
     events
+}
+
+/// Whether the weather is on its way from one state to another in a tick.
+pub(crate) fn weather_is_changing(scenario: &Scenario, tick: u32) -> bool {
+    let changes = Timeline::new(scenario).changes;
+    changes.iter().any(|step| step.last > step.first && (step.first..=step.last).contains(&tick))
 }
 
 fn surface_number(scenario: &Scenario, name: &str) -> Option<u32> {
@@ -165,11 +187,13 @@ impl Timeline {
                     timeline.strokes.push(BrushStep { tick, brush: event.brush(), surface });
                 }
                 Action::Material(change) => timeline.add_material(scenario, change, tick),
+                Action::Adjust(adjustment) => timeline.add_adjustment(scenario, adjustment, tick),
                 _ => {}
             }
         }
-        // What surfaces are made of at first was put in when they first changed.
+        // What surfaces and emitters are at first was put in when they first changed.
         timeline.materials.sort_by_key(|step| step.tick);
+        timeline.emitters.sort_by_key(|step| step.tick);
         timeline
     }
 
@@ -192,10 +216,31 @@ impl Timeline {
         if let Some((index, spec)) = change.material.as_ref().and_then(made_of) {
             step = MaterialStep { material: Some(index), porous: spec.porous, water: spec.water, ..step };
         }
+        if let Some(porous) = change.porous {
+            step.porous = porous;
+        }
         if let Some(model) = change.model {
             step.porous.model = model;
         }
+        if let Some(water) = change.water {
+            step.water = water;
+        }
         self.materials.push(step);
+    }
+
+    fn add_adjustment(&mut self, scenario: &Scenario, adjustment: &EmitterAdjustment, tick: u32) {
+        let Some(index) = scenario.emitters.iter().position(|spec| spec.name == adjustment.emitter) else {
+            return;
+        };
+        let emitter = index as u32;
+        let current = self.emitters.iter().rev().find(|step| step.emitter == emitter);
+        let mut spec = current.map(|step| step.spec.clone()).unwrap_or_else(|| {
+            let first = scenario.emitters[index].clone();
+            self.emitters.push(EmitterStep { tick: 0, emitter, spec: first.clone() });
+            first
+        });
+        adjustment.make(&mut spec);
+        self.emitters.push(EmitterStep { tick, emitter, spec });
     }
 }
 
@@ -229,29 +274,27 @@ pub(crate) fn captures(scenario: &Scenario) -> Vec<(u32, &str)> {
 /// When an emitter works and where it is, with what events say of it.
 pub(super) fn emitter_motion(scenario: &Scenario, spec: &EmitterSpec) -> EmitterMotion {
     let hz = scenario.tick_hz;
-    let (mut keys, mut switches) = (spec.keys.clone(), Vec::new());
+    let (mut legs, mut switches) = (Vec::new(), Vec::new());
     for (_, EventSpec { at, what }) in in_order(scenario) {
         match what {
             Action::Start(name) if *name == spec.name => switches.push((tick_from(*at, hz), true)),
             Action::Stop(name) if *name == spec.name => switches.push((tick_from(*at, hz), false)),
             Action::Move(step) if step.emitter == spec.name => {
                 let t = *at as f32;
-                // From its first move on its own keys are not looked at; a move that is under way ends here.
-                let pose = between(&keys, |key| key.t, t).map(|(from, to, part)| EmitterKey {
-                    t,
-                    position: from.position.lerp(to.position, part),
-                    target: from.target.lerp(to.target, part),
-                });
-                keys.retain(|key| key.t < t);
-                keys.extend(pose);
+                // A move that is under way ends here; what was before is not touched.
+                let Some((position, target)) = pose(&spec.keys, &legs, t) else { continue };
                 // What is at once is done by the end of the first tick that begins then, and not before.
                 let arrives = t + step.over.max(0.5 / hz as f32);
-                keys.push(EmitterKey { t: arrives, position: step.position, target: step.target });
+                legs.push(Leg {
+                    from: EmitterKey { t, position, target },
+                    to: EmitterKey { t: arrives, position: step.position, target: step.target },
+                });
             }
             _ => {}
         }
     }
-    EmitterMotion { keys, start: spec.start, stop: spec.stop.unwrap_or(scenario.seconds), switches }
+    let stop = spec.stop.unwrap_or(scenario.seconds);
+    EmitterMotion { keys: spec.keys.clone(), legs, start: spec.start, stop, switches }
 }
 
 #[cfg(test)]
@@ -355,13 +398,46 @@ mod tests {
         );
         let motion = emitter_motion(&scenario, &scenario.emitters[0]);
         assert_eq!(motion.switches, [(11, true), (21, false)]);
-        let x_at = |tick: u32| {
-            let (from, to, part) = between(&motion.keys, |key| key.t, tick as f32 / 10.0).unwrap();
-            from.position.lerp(to.position, part).x
-        };
+        let x_at = |tick: u32| pose(&motion.keys, &motion.legs, tick as f32 / 10.0).unwrap().0.x;
         for (tick, x) in [(1, 0.0), (30, 0.0), (31, 1.0), (40, 1.0), (50, 2.0), (60, 3.0), (90, 3.0)] {
             assert!((x_at(tick) - x).abs() < 1e-5, "{tick}: {}", x_at(tick));
         }
+    }
+
+    #[test]
+    fn a_move_changes_nothing_of_what_was_before_it() {
+        let from = |moves: usize| {
+            let all: Vec<_> = (0..moves)
+                .map(|index| {
+                    let at = 0.7 + 0.3 * index as f32;
+                    format!(
+                        r#"(at: {at:?}, what: Move(emitter: "rain", position: ({at:?}, 2.1, 0.3), target: (0.0, 0.0, 0.0), over: 0.9))"#
+                    )
+                })
+                .collect();
+            let scenario = scenario(&format!("[{}]", all.join(", ")));
+            emitter_motion(&scenario, &scenario.emitters[0])
+        };
+        let (some, more) = (from(5), from(12));
+        let poses = |motion: &EmitterMotion, ticks: std::ops::RangeInclusive<u32>| -> Vec<_> {
+            let at = |tick| pose(&motion.keys, &motion.legs, tick as f32 / 10.0).unwrap();
+            ticks.map(at).collect()
+        };
+        // The sixth begins at 2.2 seconds.
+        assert_eq!(poses(&some, 1..=22), poses(&more, 1..=22));
+        assert_ne!(poses(&some, 23..=23), poses(&more, 23..=23));
+    }
+
+    #[test]
+    fn emitters_remember_what_they_were() {
+        let timeline = Timeline::new(&scenario(
+            r#"[(at: 2.0, what: Adjust(emitter: "rain", rate: 7.0)),
+                (at: 1.0, what: Adjust(emitter: "rain", spread_deg: 10.0, flow: LitresPerMinute(2.0)))]"#,
+        ));
+        let steps: Vec<_> =
+            timeline.emitters.iter().map(|step| (step.tick, step.spec.rate, step.spec.spread_deg)).collect();
+        assert_eq!(steps, [(0, 1.0, 0.0), (11, 1.0, 10.0), (21, 7.0, 10.0)]);
+        assert_eq!(timeline.emitters[2].spec.initial_speed(), 1.0);
     }
 
     #[test]

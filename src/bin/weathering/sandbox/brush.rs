@@ -10,6 +10,7 @@ use bevy_egui::egui;
 use bevy_weathering::brush::{Brush, BrushKind, BrushQueue, Stroke, paint_strokes};
 use bevy_weathering::collision::CollisionScene;
 use bevy_weathering::matter::SurfaceMatter;
+use bevy_weathering::record::Recording;
 use bevy_weathering::wetting::SurfaceWater;
 
 use super::hose::Pointed;
@@ -64,6 +65,7 @@ fn paint(
     mut queue: ResMut<BrushQueue>,
     mut last: ResMut<Last>,
     mut undo: ResMut<Undo>,
+    mut recording: Option<ResMut<Recording>>,
     mut commands: Commands,
 ) {
     let Some(kind) = settings.tool.brush().filter(|_| pointed.held) else {
@@ -82,12 +84,18 @@ fn paint(
     }
     // A surface that is not measured yet cannot be touched.
     let Ok((water, matter)) = surfaces.get(hit.surface) else { return };
-    undo.keep(hit.surface, water, matter);
+    match &mut recording {
+        // A recording takes strokes back in its own way.
+        Some(recording) if last.0.is_none() => recording.begin_stroke(),
+        Some(_) => {}
+        None => undo.keep(hit.surface, water, matter),
+    }
     last.0 = Some((Instant::now(), hit.point));
     let brush = Brush { kind, point: hit.point, radius, strength: strength(kind, &settings.brush) };
     // Of one surface only: what is taken back is what was kept.
     queue.0.push(Stroke { brush, surface: Some(hit.surface) });
-    if time.is_paused() {
+    // What is recorded acts in ticks alone.
+    if time.is_paused() && recording.is_none() {
         commands.run_system_cached(paint_strokes);
     }
 }
@@ -129,7 +137,8 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     let [radius, strength] = BrushSettings::RANGES;
     number(ui, "radius, m", &mut brush.radius, radius, "Most in the middle, nothing at the rim");
     number(ui, "strength", &mut brush.strength, strength, "Of 1 mm of water, .2 mm of dust, or all there is");
-    let count = world.resource::<Undo>().count();
+    let recording = world.get_resource::<Recording>();
+    let count = recording.map_or_else(|| world.resource::<Undo>().count(), Recording::strokes);
     ui.horizontal(|ui| {
         let button = ui.add_enabled(count > 0, egui::Button::new("Take back"));
         if button.on_hover_text("The last stroke (Ctrl+Z)").clicked() {

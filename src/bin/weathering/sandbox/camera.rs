@@ -38,6 +38,11 @@ impl View {
         Self { target, distance, yaw: offset.x.atan2(offset.z), pitch }
     }
 
+    /// The eye, and what it looks at.
+    pub fn line(&self) -> (Vec3, Vec3) {
+        (self.eye(), self.target)
+    }
+
     fn rotation(&self) -> Quat {
         Quat::from_euler(EulerRot::YXZ, self.yaw, -self.pitch, 0.0)
     }

@@ -5,6 +5,7 @@ use bevy::prelude::*;
 use bevy_egui::egui;
 use bevy_weathering::effect::{Carries, DropSizes, EffectTable, ShippedEffect, WeatherEffect};
 use bevy_weathering::emitter::Emitter;
+use bevy_weathering::record::Recording;
 
 use super::theme;
 use super::ui::{AddPanel, Place};
@@ -17,6 +18,11 @@ pub struct Shipped([Option<Handle<WeatherEffect>>; ShippedEffect::ALL.len()]);
 /// Names of the effects that come with the project.
 pub fn names() -> impl Iterator<Item = &'static str> {
     ShippedEffect::ALL.into_iter().map(|shipped| shipped.name)
+}
+
+/// The file of an effect that comes with the project.
+pub fn text(name: &str) -> Option<&'static str> {
+    SHIPPED.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
 }
 
 /// An effect that comes with the project.
@@ -89,6 +95,10 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
         ui.label("It is made in code and cannot be edited.");
         return;
     };
+    if world.contains_resource::<Recording>() {
+        let warning = "No event can say what is edited here: the recording would not replay as it was.";
+        ui.colored_label(theme::WARNING, warning);
+    }
     let mut effect = before.clone();
     edit(ui, &mut effect);
     if effect == before {

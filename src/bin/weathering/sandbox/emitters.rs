@@ -4,6 +4,7 @@ use bevy::prelude::*;
 use bevy_egui::egui;
 use bevy_weathering::emitter::{Emitter, EmitterShape, EmitterState, Flow};
 use bevy_weathering::particle::{ParticleConfig, ParticleCounts};
+use bevy_weathering::record::Recording;
 use bevy_weathering::scenario::{ByHand, SceneEntity};
 
 use super::effects;
@@ -48,7 +49,9 @@ fn show_emitter(ui: &mut egui::Ui, world: &mut World, entity: Entity) {
     let Some(before) = world.get::<Emitter>(entity).cloned() else { return };
     let mut emitter = before.clone();
     let mut by_hand = world.get::<ByHand>(entity).is_some();
-    let is_scripted = world.get::<SceneEntity>(entity).is_some();
+    // What is done to a recorded one becomes an event: it is taken over by that.
+    let is_recorded = world.contains_resource::<Recording>();
+    let is_scripted = world.get::<SceneEntity>(entity).is_some() && !is_recorded;
     if is_scripted {
         let about = "Its keys and working hours do not apply while it is in your hand";
         if ui.checkbox(&mut by_hand, "by hand").on_hover_text(about).changed() {
@@ -78,14 +81,16 @@ fn show_emitter(ui: &mut egui::Ui, world: &mut World, entity: Entity) {
     let about = "At the start; under a sky 0 is as fast as its drops fall";
     number(ui, "speed, m/s", &mut emitter.speed, (0.0, 60.0), about);
     shape(ui, &mut emitter.shape);
-    egui::ComboBox::from_label("effect").selected_text("exchange").show_ui(ui, |ui| {
-        for name in effects::names() {
-            if ui.selectable_label(false, name).clicked()
-                && let Some(effect) = effects::shipped(world, name)
-            {
-                emitter.effect = effect;
+    ui.add_enabled_ui(!is_recorded, |ui| {
+        egui::ComboBox::from_label("effect").selected_text("exchange").show_ui(ui, |ui| {
+            for name in effects::names() {
+                if ui.selectable_label(false, name).clicked()
+                    && let Some(effect) = effects::shipped(world, name)
+                {
+                    emitter.effect = effect;
+                }
             }
-        }
+        });
     });
     if let Some(state) = world.get::<EmitterState>(entity) {
         ui.small(format!("{} sent so far", state.emitted));

@@ -4,6 +4,8 @@ use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_egui::egui;
 use bevy_weathering::emitter::Emitter;
+use bevy_weathering::record::{ExtraEmitter, Recording};
+use bevy_weathering::scenario::{EmitterKey, EmitterSpec};
 
 use super::camera::View;
 use super::effects;
@@ -13,6 +15,9 @@ use super::widgets::number;
 
 /// Number of its random stream: behind those of any scenario.
 const STREAM: u32 = u32::MAX;
+
+/// What it is called.
+pub const NAME: &str = "hose in the hand";
 
 /// The emitter in the hand. Spawned with the first press after it has gone, so that a scene without it is as it was loaded.
 #[derive(Component)]
@@ -62,11 +67,18 @@ fn point(
 fn spray(
     pointed: Res<Pointed>,
     settings: Res<Settings>,
+    recording: Option<Res<Recording>>,
     mut commands: Commands,
     mut hoses: Query<(&mut Emitter, &mut Transform, &mut GlobalTransform), With<InHand>>,
+    mut was_open: Local<bool>,
 ) {
     let is_open = pointed.held && settings.tool == Tool::Hose;
     let aim = pointed.ray.filter(|_| is_open).map(aimed);
+    let is_let_go = std::mem::replace(&mut *was_open, is_open) && !is_open;
+    // What was recorded is not interfered with while it runs again.
+    if !is_open && !is_let_go && recording.is_some_and(|recording| !recording.is_at_end()) {
+        return;
+    }
     let Ok((mut emitter, mut transform, mut global)) = hoses.single_mut() else {
         if let Some(aim) = aim {
             commands.queue(move |world: &mut World| take(world, aim));
@@ -90,6 +102,27 @@ fn aimed(ray: Ray3d) -> Transform {
     eye.with_translation(hand).looking_at(ray.origin + ray.direction * 4.0, Vec3::Y)
 }
 
+/// The hose as an emitter of a recorded scenario; off.
+pub fn to_record(settings: &HoseSettings) -> Option<ExtraEmitter> {
+    let mut emitter = Emitter { lifetime: 6.0, ..default() };
+    set(&mut emitter, settings);
+    let spec = EmitterSpec {
+        name: NAME.into(),
+        effect: String::new(),
+        rate: emitter.rate,
+        shape: emitter.shape,
+        flow: emitter.flow,
+        speed: Some(emitter.speed),
+        spread_deg: settings.spread_deg,
+        lifetime: emitter.lifetime,
+        start: 0.0,
+        stop: None,
+        // Anywhere: it is moved to where it is opened.
+        keys: vec![EmitterKey { t: 0.0, position: Vec3::Y, target: Vec3::ZERO }],
+    };
+    Some(ExtraEmitter { spec, effect: effects::text(&settings.effect)?.into(), is_on: false })
+}
+
 /// A hose as the settings have it.
 fn take(world: &mut World, aim: Transform) {
     let settings = world.resource::<Settings>().hose.clone();
@@ -97,7 +130,7 @@ fn take(world: &mut World, aim: Transform) {
     let mut emitter = Emitter { stream: STREAM, lifetime: 6.0, ..default() };
     set(&mut emitter, &settings);
     emitter.effect = effect;
-    world.spawn((Name::new("hose in the hand"), InHand, emitter, aim, GlobalTransform::from(aim)));
+    world.spawn((Name::new(NAME), InHand, emitter, aim, GlobalTransform::from(aim)));
 }
 
 /// Makes an emitter the hose of these settings, but for its effect.
@@ -129,10 +162,14 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     let before = world.resource::<Settings>().hose.clone();
     let mut hose = before.clone();
     ui.label("Hold the left button in the scene.");
-    egui::ComboBox::from_label("sprays").selected_text(hose.effect.as_str()).show_ui(ui, |ui| {
-        for name in effects::names() {
-            ui.selectable_value(&mut hose.effect, name.to_owned(), name);
-        }
+    let is_recording = world.contains_resource::<Recording>();
+    // A recorded emitter keeps its effect.
+    ui.add_enabled_ui(!is_recording, |ui| {
+        egui::ComboBox::from_label("sprays").selected_text(hose.effect.as_str()).show_ui(ui, |ui| {
+            for name in effects::names() {
+                ui.selectable_value(&mut hose.effect, name.to_owned(), name);
+            }
+        });
     });
     let [flow, nozzle, spread, rate] = HoseSettings::RANGES;
     number(ui, "flow, l/min", &mut hose.litres_per_minute, flow, "A garden hose has 15");
@@ -148,7 +185,7 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     let mut hoses = world.query_filtered::<&mut Emitter, With<InHand>>();
     for mut emitter in hoses.iter_mut(world) {
         set(&mut emitter, &hose);
-        if let Some(effect) = &effect {
+        if let (Some(effect), false) = (&effect, is_recording) {
             emitter.effect = effect.clone();
         }
     }

@@ -28,6 +28,7 @@ const KEYS: &[(&str, &str)] = &[
     ("M, P", "maps, plots"),
     ("V", "what surfaces show: look, wetness, film, saturation, source"),
     ("X", "export the scene as it is"),
+    ("F9", "record a session; write it and end"),
     ("F12", "picture without panels"),
     ("F11", "begin, end a sequence of pictures"),
     ("? or F1", "this list"),

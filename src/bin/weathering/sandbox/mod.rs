@@ -19,6 +19,7 @@ mod open;
 mod pace;
 mod plots;
 mod probe;
+mod record;
 mod reveal;
 mod saving;
 mod scenes;
@@ -105,6 +106,7 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
             leave::plugin,
             reveal::plugin,
             export::plugin,
+            record::plugin,
         ))
         .add_systems(PreUpdate, spare_software_renderers)
         .add_systems(Update, tell_of_reloads)

@@ -65,6 +65,7 @@ pub fn bare_scenario(file: &Path) -> Result<LoadedScenario, String> {
         surfaces: Vec::new(),
         emitters: Vec::new(),
         events: Vec::new(),
+        flaws: Vec::new(),
     };
     let loaded = LoadedScenario::made(scenario, file.into(), tree);
     let name = file.file_name().unwrap_or_default().to_string_lossy();

@@ -13,7 +13,7 @@ use bevy_weathering::scenario::{
 };
 
 use super::ui::Note;
-use super::{model, split};
+use super::{model, record, split};
 
 /// What is open.
 #[derive(Resource)]
@@ -70,6 +70,7 @@ fn finish(world: &mut World) {
         None => world.resource_mut::<Opening>().0 = Some((file, task)),
         Some(Ok(prepared)) => {
             let (loaded, is_model) = (prepared.scenario().clone(), model::is_model(&file));
+            record::finish(world);
             split::end(world);
             switch_scenario(world, prepared);
             model::light_shade(world, is_model);

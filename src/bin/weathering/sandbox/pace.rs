@@ -7,11 +7,12 @@ use bevy::prelude::*;
 use bevy_egui::egui;
 use bevy_weathering::clock::{ShownTime, WeatheringClock};
 use bevy_weathering::overload::LiveLoad;
+use bevy_weathering::record::Recording;
 use bevy_weathering::scenario::{ScenarioStatus, reset_scenario};
 use bevy_weathering::schedule::WeatheringTick;
 
-use super::theme;
 use super::ui::{AddPanel, Note, Place, keyboard_is_free};
+use super::{record, theme};
 
 /// Slowest and fastest.
 const SPEEDS: (f64, f64) = (0.1, 100.0);
@@ -61,7 +62,7 @@ fn step(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
 
 /// Pauses, or goes on, once the scene is there.
 fn toggle(world: &mut World) {
-    if !matches!(*world.resource::<ScenarioStatus>(), ScenarioStatus::Ready) {
+    if !matches!(*world.resource::<ScenarioStatus>(), ScenarioStatus::Ready) || record::is_travelling(world) {
         return;
     }
     let mut time = world.resource_mut::<Time<Virtual>>();
@@ -74,7 +75,7 @@ fn toggle(world: &mut World) {
 
 /// One tick, and no other after it.
 fn one_tick(world: &mut World) {
-    if matches!(*world.resource::<ScenarioStatus>(), ScenarioStatus::Ready) {
+    if matches!(*world.resource::<ScenarioStatus>(), ScenarioStatus::Ready) && !record::is_travelling(world) {
         world.resource_mut::<Time<Virtual>>().pause();
         world.run_schedule(WeatheringTick);
     }
@@ -82,6 +83,10 @@ fn one_tick(world: &mut World) {
 
 /// Dry, at the first tick.
 pub fn start_over(world: &mut World) {
+    if world.contains_resource::<Recording>() {
+        record::travel(world, 0.0);
+        return;
+    }
     reset_scenario(world);
     world.insert_resource(ShownTime::Now);
     world.resource_mut::<Note>().tell("started over");

@@ -13,6 +13,7 @@ use bevy_egui::egui;
 use bevy_weathering::clock::ShownTime;
 use bevy_weathering::overlay::{Overlays, SplatQueue, SplatStats};
 use bevy_weathering::particle::Particles;
+use bevy_weathering::record::{self, Recording};
 use bevy_weathering::replay::without_padding;
 use bevy_weathering::save::{ColorMaps, SaveError, SavedScene};
 use bevy_weathering::scenario::{LoadedScenario, ScenarioStatus, ScenarioSurface, reset_scenario};
@@ -33,15 +34,23 @@ const SETTLE: u32 = 4;
 #[derive(Resource, Default)]
 struct Folder(Option<String>);
 
+/// What the state that is taken is for.
+enum Purpose {
+    /// A folder.
+    Folder(PathBuf),
+    /// A moment of a session that is recorded; time goes on then, if it did before.
+    Moment { goes_on: bool },
+}
+
 /// A scene that is being saved, or gone on with.
 #[derive(Resource, Default)]
 pub struct Saving(Option<Step>);
 
 enum Step {
     /// So many frames until the maps are read.
-    Settling { folder: PathBuf, frames: u32 },
+    Settling { purpose: Purpose, frames: u32 },
     /// Maps by surface, in the order of the scenario.
-    Reading { folder: PathBuf, maps: Vec<[Option<Vec<u8>>; 3]> },
+    Reading { purpose: Purpose, maps: Vec<[Option<Vec<u8>>; 3]> },
     /// So many frames until surfaces that were reset have their new, empty maps.
     Clearing { folder: PathBuf, scene: Box<SavedScene>, frames: u32 },
     /// On another thread.
@@ -111,6 +120,9 @@ fn obstacle(world: &mut World) -> Option<&'static str> {
         return Some("A model that was opened by itself has no scenario to be saved with.");
     }
     let rows = opened.effects;
+    if world.contains_resource::<Recording>() {
+        return Some("End the recording first: it keeps moments of its own.");
+    }
     if world.contains_resource::<Split>() {
         return Some("End the comparison first: the copy is no part of the scenario.");
     }
@@ -153,7 +165,9 @@ pub fn show(ui: &mut egui::Ui, world: &mut World) {
             }
         }
     }
-    let is_alone = !world.resource::<Opened>().is_model && !world.contains_resource::<Split>();
+    let is_alone = !world.resource::<Opened>().is_model
+        && !world.contains_resource::<Split>()
+        && !world.contains_resource::<Recording>();
     let is_saved = is_alone && path.join("state.ron").is_file();
     if is_saved
         && ui.button("Go on from there").on_hover_text("Of the same scenario only").clicked()
@@ -178,7 +192,38 @@ fn begin(world: &mut World, folder: &Path) {
     }
     put_tools_away(world);
     world.resource_mut::<Time<Virtual>>().pause();
-    world.resource_mut::<Saving>().0 = Some(Step::Settling { folder: folder.into(), frames: SETTLE });
+    world.resource_mut::<Saving>().0 =
+        Some(Step::Settling { purpose: Purpose::Folder(folder.into()), frames: SETTLE });
+}
+
+/// Keeps this moment of the session that is recorded, once its colour maps are read back; time stands still until then.
+pub fn keep_moment(world: &mut World) {
+    if world.resource::<Saving>().0.is_some() {
+        return;
+    }
+    let mut time = world.resource_mut::<Time<Virtual>>();
+    let goes_on = !time.is_paused();
+    time.pause();
+    world.resource_mut::<Saving>().0 =
+        Some(Step::Settling { purpose: Purpose::Moment { goes_on }, frames: SETTLE });
+}
+
+/// Gives up to keep a moment.
+pub fn give_up_moment(world: &mut World) {
+    let mut saving = world.resource_mut::<Saving>();
+    let (Some(Step::Settling { purpose, .. }) | Some(Step::Reading { purpose, .. })) = &saving.0 else {
+        return;
+    };
+    let Purpose::Moment { goes_on } = *purpose else { return };
+    saving.0 = None;
+    if goes_on {
+        world.resource_mut::<Time<Virtual>>().unpause();
+    }
+}
+
+/// Whether maps are being read back or written.
+pub fn is_busy(world: &World) -> bool {
+    world.resource::<Saving>().0.is_some()
 }
 
 /// Reads a scene, and takes this one back to its beginning.
@@ -236,21 +281,21 @@ fn ask(world: &mut World) -> Vec<[Option<Vec<u8>>; 3]> {
 fn advance(world: &mut World) {
     let Some(step) = world.resource_mut::<Saving>().0.take() else { return };
     let next = match step {
-        Step::Settling { folder, frames: 0 } => {
+        Step::Settling { purpose, frames: 0 } => {
             let maps = ask(world);
-            Some(Step::Reading { folder, maps })
+            Some(Step::Reading { purpose, maps })
         }
-        Step::Settling { folder, frames } => {
+        Step::Settling { purpose, frames } => {
             let mut queues = world.query::<&SplatQueue>();
             // On their way, or beyond the budgets of the frames so far.
             let waits = queues.iter(world).any(|queue| !queue.is_empty())
                 || world.resource::<SplatStats>().pending() > 0;
-            Some(Step::Settling { folder, frames: if waits { SETTLE } else { frames - 1 } })
+            Some(Step::Settling { purpose, frames: if waits { SETTLE } else { frames - 1 } })
         }
-        Step::Reading { folder, maps } if maps.iter().flatten().all(Option::is_some) => {
-            Some(write(world, folder, maps))
+        Step::Reading { purpose, maps } if maps.iter().flatten().all(Option::is_some) => {
+            take(world, purpose, maps)
         }
-        Step::Reading { folder, maps } => Some(Step::Reading { folder, maps }),
+        Step::Reading { purpose, maps } => Some(Step::Reading { purpose, maps }),
         Step::Clearing { folder, scene, frames: 0 } => {
             restore(world, &folder, &scene);
             None
@@ -277,19 +322,31 @@ fn advance(world: &mut World) {
     world.resource_mut::<Saving>().0 = next;
 }
 
-/// Takes the state and has it written.
-fn write(world: &mut World, folder: PathBuf, maps: Vec<[Option<Vec<u8>>; 3]>) -> Step {
+/// Takes the state, and keeps it or has it written.
+fn take(world: &mut World, purpose: Purpose, maps: Vec<[Option<Vec<u8>>; 3]>) -> Option<Step> {
     let colors = maps.into_iter().map(|[diffuse, specular, normal]| ColorMaps {
         diffuse: diffuse.unwrap_or_default(),
         specular: specular.unwrap_or_default(),
         normal: normal.unwrap_or_default(),
     });
     let colors = colors.collect();
+    let folder = match purpose {
+        Purpose::Folder(folder) => folder,
+        Purpose::Moment { goes_on } => {
+            if let Err(error) = record::keep_moment(world, colors) {
+                world.resource_mut::<Note>().complain(error.to_string());
+            }
+            if goes_on {
+                world.resource_mut::<Time<Virtual>>().unpause();
+            }
+            return None;
+        }
+    };
     let scenario: LoadedScenario = world.resource::<Opened>().loaded.clone();
     let scene = SavedScene::capture(world, &scenario, colors);
     let to = folder.clone();
     let task = AsyncComputeTaskPool::get().spawn(async move { scene.write(&to) });
-    Step::Writing { folder, task }
+    Some(Step::Writing { folder, task })
 }
 
 #[cfg(test)]
@@ -317,7 +374,7 @@ mod tests {
     }
 
     fn settling() -> Saving {
-        Saving(Some(Step::Settling { folder: "saved".into(), frames: SETTLE }))
+        Saving(Some(Step::Settling { purpose: Purpose::Folder("saved".into()), frames: SETTLE }))
     }
 
     #[test]

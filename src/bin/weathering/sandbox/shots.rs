@@ -127,6 +127,8 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     super::saving::show(ui, world);
     ui.separator();
     super::export::show(ui, world);
+    ui.separator();
+    super::record::show(ui, world);
 }
 
 #[cfg(test)]

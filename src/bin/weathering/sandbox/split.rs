@@ -17,6 +17,7 @@ use bevy_weathering::emitter::Emitter;
 use bevy_weathering::material::{DryMaterial, PorousMaterial, StandingWater, WettingTextures};
 use bevy_weathering::overlay::Weatherable;
 use bevy_weathering::particle::ParticleMesh;
+use bevy_weathering::record::Recording;
 use bevy_weathering::scenario::SceneEntity;
 
 use super::camera::View;
@@ -71,7 +72,9 @@ fn offset((low, high): (Vec3, Vec3)) -> Vec3 {
 
 fn begin(world: &mut World) {
     let scene = world.resource::<CollisionScene>();
-    if scene.is_empty() || world.contains_resource::<Split>() {
+    // A copy is no part of a scenario that is recorded.
+    let is_recording = world.contains_resource::<Recording>();
+    if scene.is_empty() || world.contains_resource::<Split>() || is_recording {
         return;
     }
     let bounds = scene.bounds();

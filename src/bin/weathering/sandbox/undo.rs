@@ -9,8 +9,10 @@ use bevy::prelude::*;
 use bevy_weathering::brush::BrushQueue;
 use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::matter::SurfaceMatter;
+use bevy_weathering::record::Recording;
 use bevy_weathering::wetting::SurfaceWater;
 
+use super::record;
 use super::ui::{Note, keyboard_is_free};
 
 /// Bytes of all that is kept.
@@ -108,8 +110,12 @@ fn press(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
     }
 }
 
-/// Takes the last stroke back.
+/// Takes the last stroke back. While a session is recorded, by running it again without the stroke.
 pub fn undo(world: &mut World) {
+    if world.contains_resource::<Recording>() {
+        record::take_back_stroke(world);
+        return;
+    }
     let mut undo = world.resource_mut::<Undo>();
     undo.end_stroke();
     let Some(stroke) = undo.strokes.pop() else {

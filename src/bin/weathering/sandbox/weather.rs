@@ -4,6 +4,8 @@ use bevy::prelude::*;
 use bevy_egui::egui;
 use bevy_weathering::collision::CollisionScene;
 use bevy_weathering::emitter::{Emitter, EmitterShape, Flow};
+use bevy_weathering::record::{ExtraEmitter, Recording};
+use bevy_weathering::scenario::{EmitterKey, EmitterSpec};
 use bevy_weathering::weather::{DryingClock, Weather};
 
 use super::effects;
@@ -14,6 +16,9 @@ use super::widgets::number;
 /// Rain or snow that the user has switched on.
 #[derive(Component)]
 pub struct OwnRain;
+
+/// What it is called.
+pub const NAME: &str = "rain over the scene";
 
 /// Number of its random stream.
 const STREAM: u32 = u32::MAX - 1;
@@ -61,7 +66,8 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     let angles = (height_deg, around_deg);
     number(ui, "height, degrees", &mut height_deg, (1.0, 89.0), "Above the horizon");
     number(ui, "around, degrees", &mut around_deg, (-180.0, 180.0), "0 is -z, 90 is +x");
-    let moved = (height_deg, around_deg) != angles;
+    // A recording keeps the sun where it is.
+    let moved = (height_deg, around_deg) != angles && !world.contains_resource::<Recording>();
     if moved {
         weather.sun_direction = -towards_sun(height_deg, around_deg);
     }
@@ -109,10 +115,13 @@ fn show_rain(ui: &mut egui::Ui, world: &mut World) {
     let mut rain = before.clone();
     ui.heading("Rain over the scene");
     number(ui, "rain, mm/h", &mut rain.mm_per_h, (0.0, 200.0), "0 is none; 10 is strong, 50 a cloudburst");
-    egui::ComboBox::from_label("falls").selected_text(rain.effect.as_str()).show_ui(ui, |ui| {
-        for name in ["rain", "drizzle", "snow", "dust"] {
-            ui.selectable_value(&mut rain.effect, name.to_owned(), name);
-        }
+    let is_recording = world.contains_resource::<Recording>();
+    ui.add_enabled_ui(!is_recording, |ui| {
+        egui::ComboBox::from_label("falls").selected_text(rain.effect.as_str()).show_ui(ui, |ui| {
+            for name in ["rain", "drizzle", "snow", "dust"] {
+                ui.selectable_value(&mut rain.effect, name.to_owned(), name);
+            }
+        });
     });
     number(ui, "particles/s", &mut rain.rate, (10.0, 50_000.0), "Each stands for the drops of a patch");
     if rain == before {
@@ -121,6 +130,17 @@ fn show_rain(ui: &mut egui::Ui, world: &mut World) {
     *world.resource_mut::<Rain>() = rain.clone();
     let mut emitters = world.query_filtered::<Entity, (With<OwnRain>, Without<CopyOf>)>();
     let clouds: Vec<Entity> = emitters.iter(world).collect();
+    if is_recording {
+        // It is the scenario's, and stays there when it is off.
+        if let Some(mut cloud) = clouds.first().and_then(|&cloud| world.get_mut::<Emitter>(cloud)) {
+            cloud.enabled = rain.mm_per_h > 0.0;
+            cloud.rate = rain.rate;
+            if cloud.enabled {
+                cloud.flow = Flow::MmPerHour(rain.mm_per_h);
+            }
+        }
+        return;
+    }
     if rain.mm_per_h <= 0.0 {
         clouds.into_iter().for_each(|cloud| {
             world.despawn(cloud);
@@ -148,7 +168,29 @@ fn show_rain(ui: &mut egui::Ui, world: &mut World) {
         return;
     }
     let transform = Transform::from_translation(place);
-    world.spawn((Name::new("rain over the scene"), OwnRain, emitter, transform));
+    world.spawn((Name::new(NAME), OwnRain, emitter, transform));
+}
+
+/// The rain as an emitter of a recorded scenario; `None` over a scene without a size.
+pub fn to_record(world: &World) -> Option<ExtraEmitter> {
+    let rain = world.resource::<Rain>();
+    let (low, high) = world.resource::<CollisionScene>().bounds();
+    let (half_size, position) = above(low, high)?;
+    let is_on = rain.mm_per_h > 0.0;
+    let spec = EmitterSpec {
+        name: NAME.into(),
+        effect: String::new(),
+        rate: rain.rate,
+        shape: EmitterShape::Sky { half_size },
+        flow: Flow::MmPerHour(if is_on { rain.mm_per_h } else { 10.0 }),
+        speed: Some(0.0),
+        spread_deg: 0.0,
+        lifetime: 60.0,
+        start: 0.0,
+        stop: None,
+        keys: vec![EmitterKey { t: 0.0, position, target: position - Vec3::Y }],
+    };
+    Some(ExtraEmitter { spec, effect: effects::text(&rain.effect)?.into(), is_on })
 }
 
 /// The rain falls on all of the scene, also when another is opened, or when it grows.

@@ -1,0 +1,384 @@
+//! Recording what is done, as a scenario that replays to the same digest; going back in it, and branching off.
+//!
+//! A recording begins with the scene started over: what is open, as it is set, is written into a folder of its own and opened from
+//! there, with the hose in the hand and the rain over the scene as emitters of it. What is done then is found and written down
+//! by the library's `record`; here are the buttons, the time bar, and the frames that going back takes.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use bevy::prelude::*;
+use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+use bevy_egui::egui;
+use bevy_weathering::clock::{ShownTime, WeatheringClock};
+use bevy_weathering::effect::EffectTable;
+use bevy_weathering::record::{self, Beginning, RecordError, Recording};
+use bevy_weathering::scenario::{
+    Action, CameraKey, CameraMove, LoadedScenario, PreparedScenario, ScenarioStatus, SceneEntity,
+    switch_scenario,
+};
+use bevy_weathering::schedule::run_tick;
+
+use super::camera::View;
+use super::hose::{self, InHand};
+use super::open::Opened;
+use super::settings::Settings;
+use super::shots::{OutFolder, free_name};
+use super::split::Split;
+use super::ui::{AddPanel, Note, Place, keyboard_is_free};
+use super::weather::{self, OwnRain};
+use super::{model, saving, theme};
+
+/// Frames between starting over and putting a moment back, in which surfaces get their new, empty maps.
+const SETTLE: u32 = 4;
+/// How long a frame may run ticks to reach a second that is gone to.
+const PATIENCE: Duration = Duration::from_millis(60);
+/// Seconds between two keys of the camera.
+const CAMERA_SECONDS: f64 = 0.5;
+
+type Prepared = Result<(LoadedScenario, PreparedScenario), String>;
+
+/// The base of a recording, while it is being written and read.
+#[derive(Resource, Default)]
+struct Preparing(Option<Task<Prepared>>);
+
+/// On the way to another second.
+#[derive(Resource, Default)]
+struct Travel {
+    /// So many frames until a moment is put back.
+    frames: u32,
+    /// Time goes on when it is reached.
+    goes_on: bool,
+    is_under_way: bool,
+}
+
+/// Where the time bar is being dragged to.
+#[derive(Resource, Default)]
+struct Bar(Option<f64>);
+
+/// The last key of the camera.
+#[derive(Resource, Default)]
+struct LastView(Option<(f64, CameraMove)>);
+
+pub fn plugin(app: &mut App) {
+    app.add_plugins(record::RecordPlugin)
+        .init_resource::<Preparing>()
+        .init_resource::<Travel>()
+        .init_resource::<Bar>()
+        .init_resource::<LastView>()
+        // No tick may run by itself on the way to another second.
+        .add_systems(PreUpdate, stand_still)
+        .add_systems(Update, (press.run_if(keyboard_is_free), advance))
+        .add_systems(Last, write_at_the_end)
+        .add_panel(Place::Bar, "record", show_bar);
+}
+
+/// Whether the scene is on its way to another second: no tick runs then but those of the way.
+pub fn is_travelling(world: &World) -> bool {
+    world.resource::<Travel>().is_under_way
+}
+
+fn stand_still(travel: Res<Travel>, mut time: ResMut<Time<Virtual>>) {
+    if travel.is_under_way && !time.is_paused() {
+        time.pause();
+    }
+}
+
+fn press(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
+    if keys.just_pressed(KeyCode::F9) {
+        commands.queue(toggle);
+    }
+}
+
+/// Begins to record, or writes what was recorded and ends.
+fn toggle(world: &mut World) {
+    if world.contains_resource::<Recording>() {
+        finish(world);
+    } else {
+        begin(world);
+    }
+}
+
+/// Why nothing can be recorded.
+fn obstacle(world: &World) -> Option<&'static str> {
+    if world.resource::<Opened>().is_model {
+        return Some("A model that was opened by itself has no scenario to be recorded as.");
+    }
+    if world.contains_resource::<Split>() {
+        return Some("End the comparison first: the copy is no part of the scenario.");
+    }
+    if !matches!(world.resource::<ScenarioStatus>(), ScenarioStatus::Ready) || saving::is_busy(world) {
+        return Some("Wait until the scene is there.");
+    }
+    None
+}
+
+/// Begins to write and read what a recording begins with.
+fn begin(world: &mut World) {
+    if world.resource::<Preparing>().0.is_some() {
+        return;
+    }
+    if let Some(why) = obstacle(world) {
+        world.resource_mut::<Note>().complain(why);
+        return;
+    }
+    let mut beginning = Beginning::of(world);
+    let mut views = world.query::<&View>();
+    beginning.view = views.iter(world).next().map(|view| {
+        let (eye, target) = view.line();
+        CameraKey { t: 0.0, eye, target }
+    });
+    let hose = hose::to_record(&world.resource::<Settings>().hose);
+    beginning.emitters = hose.into_iter().chain(weather::to_record(world)).collect();
+    let loaded = world.resource::<Opened>().loaded.clone();
+    let folder: PathBuf = free_name(&world.resource::<OutFolder>().0, "recorded", "");
+    let task = AsyncComputeTaskPool::get().spawn(async move {
+        let base = record::prepare(&loaded, beginning, &folder).map_err(|error| error.to_string())?;
+        let prepared = PreparedScenario::new(base.clone(), true).map_err(|error| error.to_string())?;
+        Ok::<_, String>((base, prepared))
+    });
+    world.resource_mut::<Preparing>().0 = Some(task);
+}
+
+/// Shows the base and records from its first tick on.
+fn start(world: &mut World, base: LoadedScenario, prepared: PreparedScenario) {
+    // They are emitters of the scenario from now on.
+    let mut tools = world.query_filtered::<Entity, Or<(With<InHand>, With<OwnRain>)>>();
+    for tool in tools.iter(world).collect::<Vec<_>>() {
+        world.despawn(tool);
+    }
+    switch_scenario(world, prepared);
+    model::light_shade(world, false);
+    let mut emitters = world.query_filtered::<(Entity, &Name), With<SceneEntity>>();
+    let named: Vec<_> =
+        emitters.iter(world).map(|(entity, name)| (entity, name.as_str().to_owned())).collect();
+    for (entity, name) in named {
+        match name.as_str() {
+            hose::NAME => {
+                world.entity_mut(entity).insert(InHand);
+            }
+            weather::NAME => {
+                world.entity_mut(entity).insert(OwnRain);
+            }
+            _ => {}
+        }
+    }
+    let effects = world.resource::<EffectTable>().rows().len();
+    world.insert_resource(Opened { loaded: base.clone(), is_model: false, effects });
+    let told = format!("recording into {}", base.file.display());
+    record::begin(world, base);
+    world.insert_resource(LastView::default());
+    world.resource_mut::<Note>().tell(told);
+}
+
+/// Writes what is being recorded, if anything is, and ends.
+pub fn finish(world: &mut World) {
+    if !world.contains_resource::<Recording>() {
+        return;
+    }
+    saving::give_up_moment(world);
+    write(world);
+    record::end(world);
+    *world.resource_mut::<Travel>() = Travel::default();
+    // They stay, as emitters of the scenario like others.
+    let mut tools = world.query_filtered::<Entity, (With<SceneEntity>, Or<(With<InHand>, With<OwnRain>)>)>();
+    for tool in tools.iter(world).collect::<Vec<_>>() {
+        world.entity_mut(tool).remove::<(InHand, OwnRain)>();
+    }
+}
+
+/// Writes what was recorded so far.
+fn write(world: &mut World) {
+    let flaws = world.resource::<Recording>().flaws().count();
+    let written = record::save(world);
+    let mut note = world.resource_mut::<Note>();
+    match written {
+        Ok(file) if flaws == 0 => note.tell(format!("recorded {}", file.display())),
+        Ok(file) => note.complain(format!("recorded {}, but it will not replay as it was", file.display())),
+        Err(error) => note.complain(error.to_string()),
+    }
+}
+
+fn write_at_the_end(mut exits: MessageReader<AppExit>, mut commands: Commands) {
+    if exits.read().count() > 0 {
+        commands.queue(finish);
+    }
+}
+
+/// Goes to a second that has been recorded.
+pub fn travel(world: &mut World, seconds: f64) {
+    let gone = if saving::is_busy(world) { Err(RecordError::Busy) } else { record::go_to(world, seconds) };
+    match gone {
+        Ok(()) => set_out(world),
+        Err(error) => world.resource_mut::<Note>().complain(error.to_string()),
+    }
+}
+
+/// Runs the session again without the last stroke.
+pub fn take_back_stroke(world: &mut World) {
+    let taken = if saving::is_busy(world) { Err(RecordError::Busy) } else { record::take_back_stroke(world) };
+    match taken {
+        Ok(true) => set_out(world),
+        Ok(false) => world.resource_mut::<Note>().tell("no stroke to take back"),
+        Err(error) => world.resource_mut::<Note>().complain(error.to_string()),
+    }
+}
+
+fn set_out(world: &mut World) {
+    let mut time = world.resource_mut::<Time<Virtual>>();
+    let goes_on = !time.is_paused();
+    time.pause();
+    world.insert_resource(Travel { frames: SETTLE, goes_on, is_under_way: true });
+    world.insert_resource(ShownTime::Now);
+}
+
+fn advance(world: &mut World) {
+    if let Some(mut task) = world.resource_mut::<Preparing>().0.take() {
+        match check_ready(&mut task) {
+            None => world.resource_mut::<Preparing>().0 = Some(task),
+            Some(Ok((base, prepared))) => match obstacle(world) {
+                // Something else was opened meanwhile.
+                Some(why) => world.resource_mut::<Note>().complain(why),
+                None => start(world, base, prepared),
+            },
+            Some(Err(error)) => world.resource_mut::<Note>().complain(error),
+        }
+    }
+    let Some(mut recording) = world.get_resource_mut::<Recording>() else { return };
+    let notes = recording.take_notes();
+    let (is_clearing, is_catching_up, wants_moment) =
+        (recording.is_clearing(), recording.is_catching_up(), recording.wants_moment());
+    for note in notes {
+        world.resource_mut::<Note>().complain(note);
+    }
+    if is_clearing {
+        clear(world);
+    } else if is_catching_up {
+        catch_up(world);
+    } else if world.resource::<Travel>().is_under_way {
+        arrive(world);
+    } else if wants_moment {
+        keep_moment(world);
+    } else {
+        follow_view(world);
+    }
+}
+
+fn clear(world: &mut World) {
+    let mut travel = world.resource_mut::<Travel>();
+    travel.frames = travel.frames.saturating_sub(1);
+    if travel.frames == 0
+        && let Err(error) = record::put_back(world)
+    {
+        world.resource_mut::<Note>().complain(error.to_string());
+    }
+}
+
+/// Runs ticks for as long as a frame may take.
+fn catch_up(world: &mut World) {
+    let begun = Instant::now();
+    while begun.elapsed() < PATIENCE && world.resource::<Recording>().is_catching_up() {
+        let before = world.resource::<WeatheringClock>().tick();
+        run_tick(world);
+        if world.resource::<WeatheringClock>().tick() == before {
+            // It is held until what waits has been painted.
+            return;
+        }
+    }
+}
+
+fn arrive(world: &mut World) {
+    let travel = std::mem::take(&mut *world.resource_mut::<Travel>());
+    if travel.goes_on {
+        world.resource_mut::<Time<Virtual>>().unpause();
+    }
+    let seconds = world.resource::<WeatheringClock>().seconds();
+    world.resource_mut::<Note>().tell(format!("at second {seconds:.2}"));
+}
+
+/// Keeps a moment, and writes what was recorded, so that little is lost with a program that is killed.
+fn keep_moment(world: &mut World) {
+    match record::colors_at_hand(world) {
+        Some(colors) => {
+            if let Err(error) = record::keep_moment(world, colors) {
+                world.resource_mut::<Note>().complain(error.to_string());
+            }
+        }
+        None => saving::keep_moment(world),
+    }
+    if let Err(error) = record::save(world) {
+        world.resource_mut::<Note>().complain(error.to_string());
+    }
+}
+
+/// Where it was seen from, now and then: replays are seen from there, too.
+fn follow_view(world: &mut World) {
+    let seconds = world.resource::<WeatheringClock>().seconds();
+    let last = world.resource::<LastView>().0;
+    if last.is_some_and(|(at, _)| (at..at + CAMERA_SECONDS).contains(&seconds)) {
+        return;
+    }
+    let mut views = world.query::<&View>();
+    let Some((eye, target)) = views.iter(world).next().map(View::line) else { return };
+    let view = CameraMove { eye, target };
+    if last.is_none_or(|(_, last)| last != view) {
+        world.resource_mut::<Recording>().add(Action::Camera(view));
+    }
+    world.resource_mut::<LastView>().0 = Some((seconds, view));
+}
+
+/// The button, and the time bar of a recording.
+fn show_bar(ui: &mut egui::Ui, world: &mut World) {
+    let is_preparing = world.resource::<Preparing>().0.is_some();
+    let Some(recording) = world.get_resource::<Recording>() else {
+        let button = ui.add_enabled(!is_preparing, egui::Button::new("Record"));
+        let about = "Starts the scene over, and writes down what is done (F9)";
+        if button.on_hover_text(about).clicked() {
+            begin(world);
+        }
+        return;
+    };
+    let (end, is_flawed, is_live) =
+        (recording.seconds(), recording.flaws().next().is_some(), recording.is_live());
+    if ui.button("End").on_hover_text("Writes what was recorded (F9)").clicked() {
+        finish(world);
+        return;
+    }
+    let text = egui::RichText::new(format!("rec {end:.1} s"));
+    ui.label(if is_flawed { text.color(theme::WARNING) } else { text });
+    if !is_live || is_travelling(world) {
+        ui.spinner();
+        return;
+    }
+    let now = world.resource::<WeatheringClock>().seconds();
+    let mut at = world.resource::<Bar>().0.unwrap_or(now);
+    let slider = egui::Slider::new(&mut at, 0.0..=end.max(0.1)).show_value(false);
+    let about = "Drag to go to a second that is recorded; what you do there is a branch";
+    let slider = ui.add(slider).on_hover_text(about);
+    world.resource_mut::<Bar>().0 = slider.dragged().then_some(at);
+    if slider.drag_stopped() || (slider.changed() && !slider.dragged()) {
+        travel(world, at.min(end));
+    }
+}
+
+/// What is known of the recording.
+pub fn show(ui: &mut egui::Ui, world: &mut World) {
+    ui.heading("Recording");
+    let Some(recording) = world.get_resource::<Recording>() else {
+        match obstacle(world) {
+            Some(why) => ui.label(why),
+            None => ui.label("Record, in the bar above, starts the scene over and writes down what is done."),
+        };
+        return;
+    };
+    ui.small(recording.file().display().to_string());
+    let (moments, bytes) = recording.moments();
+    ui.label(format!("{} things done in {:.1} s", recording.len(), recording.seconds()));
+    ui.label(format!("{moments} moments kept, {} MiB", bytes >> 20));
+    for (at, flaw) in recording.flaws() {
+        ui.colored_label(theme::WARNING, format!("{at:.1} s: {flaw}; it will not replay as it was"));
+    }
+    if ui.button("Write now").on_hover_text("And go on recording").clicked() {
+        write(world);
+    }
+}

@@ -1,0 +1,419 @@
+//! The session that is recorded.
+
+use std::path::{Path, PathBuf};
+
+use bevy::prelude::*;
+
+use super::RecordError;
+use super::actions::{Recorded, all_events};
+use super::file::{text_of, write};
+use super::history::History;
+use super::watch::{Complaints, Watched};
+use crate::brush::{BrushQueue, Stroke};
+use crate::clock::WeatheringClock;
+use crate::effect::WeatherEffect;
+use crate::emitter::EmissionDetail;
+use crate::matter::SurfaceMatter;
+use crate::save::SavedScene;
+use crate::scenario::{
+    Action, BrushEvent, Digest, EventSpec, LoadedScenario, Scenario, ScenarioStatus, ScenarioSurface,
+    WeatherChange, amounts_digest, beginning_of, check_weather, exchange_events, tick_from,
+    weather_is_changing,
+};
+use crate::weather::Weather;
+use crate::wetting::SurfaceWater;
+
+/// What a session is about to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Phase {
+    /// The scene is being loaded.
+    Loading,
+    /// What is done is recorded.
+    Live,
+    /// All has been taken back to the start, which has to be seen before a moment can be put back.
+    Clearing { target: u32 },
+    /// Ticks run by what was recorded.
+    CatchingUp { target: u32 },
+}
+
+/// A session that is being recorded.
+#[derive(Resource)]
+pub struct Recording {
+    /// The scenario that runs, with the events of now.
+    pub(super) loaded: LoadedScenario,
+    /// Those that it had at the start.
+    base: Vec<EventSpec>,
+    /// In order of their ticks.
+    pub(super) actions: Vec<Recorded>,
+    /// Waiting for the next tick; added by the app.
+    others: Vec<Action>,
+    /// Number of the stroke that is being painted, or was last.
+    stroke: u32,
+    flaws: Vec<(u32, &'static str)>,
+    notes: Vec<String>,
+    pub(super) watched: Watched,
+    pub(super) phase: Phase,
+    /// The last tick that has run.
+    pub(super) tick: u32,
+    /// The last tick that is recorded.
+    pub(super) end: u32,
+    pub(super) history: History,
+}
+
+impl Recording {
+    /// The most events that are recorded, those of the scenario included.
+    pub const MAX_EVENTS: usize = Scenario::MAX_EVENTS;
+    /// Seconds between two moments that are kept.
+    pub const MOMENT_SECONDS: u32 = 5;
+
+    /// The file that [`save`] writes.
+    pub fn file(&self) -> &Path {
+        &self.loaded.file
+    }
+
+    /// The scenario that runs, with what has been done so far.
+    pub fn scenario(&self) -> &LoadedScenario {
+        &self.loaded
+    }
+
+    /// What was done that events cannot say, with the second: a replay comes out differently.
+    pub fn flaws(&self) -> impl Iterator<Item = (f64, &'static str)> {
+        let hz = f64::from(self.hz());
+        self.flaws.iter().map(move |(tick, flaw)| (f64::from(*tick) / hz, *flaw))
+    }
+
+    /// What was not done because it cannot be recorded, since this was last asked for.
+    pub fn take_notes(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notes)
+    }
+
+    /// What was done so far: number of events.
+    pub fn len(&self) -> usize {
+        self.actions.len()
+    }
+
+    /// Whether nothing was done yet.
+    pub fn is_empty(&self) -> bool {
+        self.actions.is_empty()
+    }
+
+    /// Seconds that are recorded.
+    pub fn seconds(&self) -> f64 {
+        f64::from(self.end) / f64::from(self.hz())
+    }
+
+    /// Number of kept moments, and their bytes.
+    pub fn moments(&self) -> (usize, usize) {
+        self.history.size()
+    }
+
+    /// Whether what is done now is recorded: the scene is there, and no time is being gone back in.
+    pub fn is_live(&self) -> bool {
+        self.phase == Phase::Live
+    }
+
+    /// Whether all that is recorded has run: what comes now is new.
+    pub fn is_at_end(&self) -> bool {
+        self.is_live() && self.tick >= self.end
+    }
+
+    /// Whether surfaces have been taken back to the start, and a frame has to go by before [`put_back`](super::put_back).
+    pub fn is_clearing(&self) -> bool {
+        matches!(self.phase, Phase::Clearing { .. })
+    }
+
+    /// Whether ticks have to run until a second that is gone to is reached.
+    pub fn is_catching_up(&self) -> bool {
+        matches!(self.phase, Phase::CatchingUp { .. })
+    }
+
+    /// Whether a moment should be kept before the next tick; see [`keep_moment`](super::keep_moment).
+    pub fn wants_moment(&self) -> bool {
+        let every = Self::MOMENT_SECONDS.saturating_mul(self.hz());
+        // The start needs none.
+        let last = self.history.before(self.tick).map_or(0, SavedScene::tick);
+        self.is_live() && self.tick.saturating_sub(last) >= every
+    }
+
+    /// Records something that is not found by itself: where the camera is. What acts on the scene is left to those who do it
+    /// there. In what has been recorded already, nothing is added.
+    pub fn add(&mut self, action: Action) {
+        if !action.acts() && self.is_at_end() {
+            self.others.push(action);
+        }
+    }
+
+    /// What is painted from now on is another stroke, to be [taken back](super::take_back_stroke) by itself.
+    pub fn begin_stroke(&mut self) {
+        self.stroke += 1;
+    }
+
+    /// Number of strokes that can be taken back.
+    pub fn strokes(&self) -> usize {
+        let mut strokes: Vec<u32> = self.actions.iter().map(|action| action.stroke).collect();
+        strokes.sort_unstable();
+        strokes.dedup();
+        strokes.iter().filter(|&&stroke| stroke > 0).count()
+    }
+
+    pub(super) fn hz(&self) -> u32 {
+        self.loaded.scenario.tick_hz
+    }
+
+    pub(super) fn uses(&self, effect: AssetId<WeatherEffect>) -> bool {
+        self.phase != Phase::Loading && self.watched.uses(effect)
+    }
+
+    /// Each is told once.
+    pub(super) fn add_flaw(&mut self, flaw: &'static str) {
+        if self.flaws.iter().all(|(_, other)| *other != flaw) {
+            let seconds = f64::from(self.tick) / f64::from(self.hz());
+            warn!("{flaw}: the recording does not replay as it was from {seconds:.1} s on");
+            self.flaws.push((self.tick, flaw));
+        }
+    }
+
+    fn add_note(&mut self, note: impl Into<String>) {
+        let note = note.into();
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
+    }
+
+    fn tell(&mut self, complaints: Complaints) {
+        complaints.refused.into_iter().for_each(|note| self.add_note(note));
+        complaints.flaws.into_iter().for_each(|flaw| self.add_flaw(flaw));
+    }
+
+    /// Takes back what was changed since events last acted, for the next tick.
+    fn take_back(&mut self, world: &mut World) {
+        if self.phase == Phase::Loading && matches!(world.resource::<ScenarioStatus>(), ScenarioStatus::Ready)
+        {
+            self.phase = Phase::Live;
+        }
+        let is_live = self.is_live();
+        let mut complaints = Complaints::default();
+        self.watched.take_back(world, is_live, &mut complaints);
+        if is_live {
+            self.watched.look_for_strangers(world, &mut complaints);
+            self.tell(complaints);
+        }
+    }
+
+    /// What is wanted in a tick.
+    fn take_actions(&mut self, world: &mut World, tick: u32) -> Vec<Action> {
+        let mut actions = Vec::new();
+        self.watched.take_actions(tick, self.hz(), &mut actions);
+        if let Some(change) = self.watched.take_weather() {
+            match self.refusal_of(&change, tick) {
+                None => actions.push(Action::Weather(change)),
+                Some(note) => self.add_note(note),
+            }
+        }
+        for Stroke { brush, surface } in take_strokes(world) {
+            let name = surface
+                .map(|surface| world.get::<ScenarioSurface>(surface).map(|surface| surface.name.clone()));
+            if name == Some(None) {
+                self.add_note("only surfaces of the scenario are painted while a session is recorded");
+                continue;
+            }
+            actions.push(Action::Brush(BrushEvent {
+                kind: brush.kind,
+                point: brush.point,
+                radius: brush.radius,
+                strength: brush.strength,
+                surface: name.flatten(),
+            }));
+        }
+        actions.append(&mut self.others);
+        actions
+    }
+
+    /// Why the weather cannot change so.
+    fn refusal_of(&self, change: &WeatherChange, tick: u32) -> Option<String> {
+        if weather_is_changing(&self.loaded.scenario, tick) {
+            return Some("the scenario is changing the weather just now".into());
+        }
+        let was = self.watched.weather();
+        let becomes = Weather {
+            wind: change.wind.unwrap_or(was.wind),
+            temperature_c: change.temperature_c.unwrap_or(was.temperature_c),
+            humidity: change.humidity.unwrap_or(was.humidity),
+            sun_w_per_m2: change.sun_w_per_m2.unwrap_or(was.sun_w_per_m2),
+            drying_speed: change.drying_speed.unwrap_or(was.drying_speed),
+            ..*was
+        };
+        check_weather(&becomes).err().map(|wrong| wrong.to_string())
+    }
+
+    /// Lets things happen in a tick, and from then on be recorded.
+    fn record(&mut self, world: &mut World, tick: u32, actions: Vec<Action>) {
+        let at = beginning_of(tick, self.hz());
+        let mut is_past = tick <= self.end;
+        for what in actions {
+            let event = EventSpec { at, what };
+            if let Err(error) = self.loaded.validate_event("events[_]", &event) {
+                self.add_note(error.to_string());
+                continue;
+            }
+            if self.base.len() + self.actions.len() >= Self::MAX_EVENTS {
+                self.add_note(format!("no more is recorded: there are {} events", Self::MAX_EVENTS));
+                break;
+            }
+            if std::mem::take(&mut is_past) {
+                self.branch(world, tick);
+            }
+            let is_stroke = matches!(event.what, Action::Brush(_));
+            let stroke = if is_stroke { self.stroke.max(1) } else { 0 };
+            self.actions.push(Recorded { tick, what: event.what, stroke });
+        }
+        self.update_events(world);
+    }
+
+    /// Lets what was done, and nothing else, happen from here on.
+    pub(super) fn update_events(&mut self, world: &mut World) {
+        self.loaded.scenario.events = all_events(&self.base, &self.actions, self.hz());
+        exchange_events(world, &self.loaded.scenario);
+    }
+
+    /// What was done in this tick or later is no more; it is written into a file of its own.
+    fn branch(&mut self, world: &mut World, tick: u32) {
+        let kept = self.actions.partition_point(|action| action.tick < tick);
+        if kept < self.actions.len() {
+            let old = free_file(&self.loaded.file);
+            let written = self.text_at(world, &old, self.end).and_then(|text| write(&old, text.as_bytes()));
+            self.add_note(match written {
+                Ok(()) => format!("a branch; what was recorded after it is in {}", old.display()),
+                Err(error) => format!("a branch; what was recorded after it is lost: {error}"),
+            });
+        }
+        self.actions.truncate(kept);
+        self.flaws.retain(|(at, _)| *at < tick);
+        self.history.forget_after(tick.saturating_sub(1));
+        self.end = tick;
+    }
+
+    /// The file that says what was done up to a tick.
+    fn text_at(&self, world: &mut World, file: &Path, end: u32) -> Result<String, RecordError> {
+        let hz = self.hz();
+        let mut scenario = self.loaded.scenario.clone();
+        let seconds = (f64::from(end.max(1)) / f64::from(hz)) as f32;
+        scenario.seconds = seconds;
+        scenario
+            .events
+            .retain(|event| event.at <= f64::from(seconds) && tick_from(event.at, hz) <= end.max(1));
+        scenario.flaws.extend(self.flaws().map(|(at, flaw)| format!("{at:.2} s: {flaw}")));
+        let mut remark = String::new();
+        if end == world.resource::<WeatheringClock>().tick() && self.is_live() {
+            remark = format!("Digest after {end} ticks: {}", digest(world));
+        }
+        text_of(&scenario, file, &remark)
+    }
+}
+
+/// Strokes that wait.
+fn take_strokes(world: &mut World) -> Vec<Stroke> {
+    world.get_resource_mut::<BrushQueue>().map(|mut queue| std::mem::take(&mut queue.0)).unwrap_or_default()
+}
+
+/// `name_1.ron`, `name_2.ron`, ...: the first that is not there beside a file.
+fn free_file(file: &Path) -> PathBuf {
+    let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let named = |number: u32| file.with_file_name(format!("{stem}_{number}.ron"));
+    (1..).map(named).find(|path| !path.exists()).unwrap_or_else(|| named(0))
+}
+
+/// Hash over impacts, events and amounts of the scenario that runs.
+fn digest(world: &mut World) -> String {
+    let impacts = *world.resource::<Digest>();
+    let mut surfaces = world.query::<(&ScenarioSurface, &SurfaceWater, &SurfaceMatter)>();
+    let mut order: Vec<_> = surfaces.iter(world).collect();
+    order.sort_by_key(|(surface, ..)| surface.index);
+    amounts_digest(&impacts, order.into_iter().map(|(_, water, matter)| (water, matter)))
+}
+
+/// Begins to record: `base` is what [`prepare`](super::prepare) has made, and has just become the scenario of the world, which
+/// still loads it. Emission has full detail until the [`end`].
+pub fn begin(world: &mut World, base: LoadedScenario) {
+    if let Some(mut detail) = world.get_resource_mut::<EmissionDetail>() {
+        detail.fix(true);
+    }
+    take_strokes(world);
+    let watched = Watched::new(world);
+    world.insert_resource(Recording {
+        base: base.scenario.events.clone(),
+        loaded: base,
+        actions: Vec::new(),
+        others: Vec::new(),
+        stroke: 0,
+        flaws: Vec::new(),
+        notes: Vec::new(),
+        watched,
+        phase: Phase::Loading,
+        tick: 0,
+        end: 0,
+        history: History::default(),
+    });
+}
+
+/// Writes what was recorded so far, whole or not at all; returns the file, which `weathering replay` runs to the same digest.
+///
+/// # Errors
+/// [`RecordError`]. The recording goes on.
+pub fn save(world: &mut World) -> Result<PathBuf, RecordError> {
+    let Some(recording) = world.remove_resource::<Recording>() else { return Err(RecordError::NotRecording) };
+    let file = recording.loaded.file.clone();
+    let text = recording.text_at(world, &file, recording.end);
+    world.insert_resource(recording);
+    write(&file, text?.as_bytes())?;
+    Ok(file)
+}
+
+/// Ends a recording without writing anything. What was done goes on as it is.
+pub fn end(world: &mut World) {
+    world.remove_resource::<Recording>();
+    if let Some(mut detail) = world.get_resource_mut::<EmissionDetail>() {
+        detail.fix(false);
+    }
+}
+
+/// What the last frame has changed.
+pub(super) fn between_ticks(world: &mut World) {
+    world.resource_scope(|world, mut recording: Mut<Recording>| recording.take_back(world));
+}
+
+/// Lets what was wanted happen in the tick that begins.
+pub(super) fn begin_tick(world: &mut World) {
+    world.resource_scope(|world, mut recording: Mut<Recording>| {
+        let recording = &mut *recording;
+        recording.take_back(world);
+        let tick = world.resource::<WeatheringClock>().tick();
+        if recording.is_live() && tick != recording.tick.saturating_add(1) {
+            recording
+                .add_flaw("the scene was started over, or gone on with, by other ways than the recording's");
+        }
+        recording.tick = tick;
+        if !recording.is_live() {
+            take_strokes(world);
+            return;
+        }
+        let actions = recording.take_actions(world, tick);
+        if !actions.is_empty() {
+            recording.record(world, tick, actions);
+        }
+        recording.end = recording.end.max(tick);
+    });
+}
+
+/// What events have made of it.
+pub(super) fn end_tick(world: &mut World) {
+    world.resource_scope(|world, mut recording: Mut<Recording>| {
+        let recording = &mut *recording;
+        recording.watched.look(world);
+        if let Phase::CatchingUp { target } = recording.phase
+            && recording.tick >= target
+        {
+            recording.phase = Phase::Live;
+        }
+    });
+}
