@@ -3,8 +3,9 @@
 use bevy::prelude::*;
 use bevy::tasks::{Task, block_on, futures::check_ready};
 
-/// When surfaces that turn, change their size or take another pose run by what was measured anew. Until then water runs by the old
-/// slopes. What is measured for the first time is always taken when it is ready: nothing has run by then.
+/// When surfaces that turn, change their size or take another pose run by what was measured anew, and when they dry by a sun that has
+/// moved. Until then it is the old slopes and shadows that count. What is measured for the first time is always taken when it is
+/// ready: nothing has run by then.
 #[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[reflect(Resource)]
 pub enum MeasureTiming {
