@@ -253,7 +253,7 @@ fn give(
     moves: &mut Vec<Move>,
 ) -> (Option<DripSite>, f32) {
     let (geometry, size) = (films.now.geometry, films.water.size);
-    let heights = geometry.height();
+    let (heights, areas) = (geometry.height(), geometry.area_mm2());
     let depth = |texel: u32, film: f32| geometry.facing_up(texel).max(0.0) * film;
     let (own_height, own_depth) = (heights[donor.texel as usize], depth(donor.texel, donor.film));
     let lengths = [Side::PlusU, Side::PlusV].map(|side| geometry.distance(donor.texel, side).max(1e-6));
@@ -279,10 +279,14 @@ fn give(
                 let sine = (drop_mm * 1.0e-3 / distance).min(1.0);
                 let speed = speed(donor.film, sine);
                 let courant = speed * seconds / distance;
-                fastest = fastest.max(courant.min(0.25 * drop_mm / donor.excess));
+                // Half of what would make both as high; as four may do so at once, a quarter of the drop for texels of one size.
+                // What a large one gives is deep on a small one.
+                let most =
+                    drop_mm * (0.5 / (1.0 + areas[donor.texel as usize] / areas[other as usize])).min(0.25);
+                fastest = fastest.max(courant.min(most / donor.excess));
                 let load = if donor.dusty { wash::load(speed, sine) } else { 0 };
                 let inside = is_inside && beside.is_some();
-                out[number] = (other, (courant * donor.excess).min(0.25 * drop_mm), inside, load);
+                out[number] = (other, (courant * donor.excess).min(most), inside, load);
             }
             Link::Edge => {
                 let rise = match geometry.link(donor.texel, side.opposite()) {
