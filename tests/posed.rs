@@ -11,7 +11,7 @@ use bevy_weathering::effect::Paint;
 use bevy_weathering::overlay::{CpuMaps, SurfaceFrames};
 use bevy_weathering::particle::Particles;
 use bevy_weathering::prelude::*;
-use bevy_weathering::wetting::{SurfaceWater, WetGeometry};
+use bevy_weathering::wetting::{Exposure, Ledger, MeasureTiming, SurfaceWater, WetGeometry};
 
 use crate::wetting::scene::Scene;
 
@@ -235,6 +235,41 @@ fn water_runs_down_the_pose_and_drips_from_its_edge() {
         }
     }
     assert!(seen > 3, "{seen} drips");
+}
+
+/// How much lower the second end of a plank lies than its first, by its slopes, metres.
+fn fall(world: &World, surface: Entity) -> f32 {
+    let heights = world.get::<WetGeometry>(surface).unwrap().0.height();
+    let row = SIZE as usize / 2 * SIZE as usize;
+    heights[row + 25] - heights[row + 243]
+}
+
+#[test]
+fn at_fixed_ticks_new_slopes_come_to_the_same_however_long_they_take() {
+    let run = |pause: Duration| -> (Vec<[u32; 2]>, Ledger, u32) {
+        let mut scene = Scene::new(60);
+        scene.0.insert_resource(MeasureTiming::AfterTicks(10));
+        let surface = scene.surface(plank(), SIZE, glazed(), Transform::default());
+        wait_for(&mut scene, "exposure", |world| world.get::<Exposure>(surface).is_some());
+        skin(&mut scene, surface, hanging(Vec3::ZERO));
+        scene.pour(surface, Vec2::new(0.9, 0.5), 6, 2_000_000);
+        let mut changed = 0;
+        for tick in 1..=90 {
+            scene.run(1);
+            if changed == 0 && fall(scene.0.world(), surface) > 0.5 {
+                changed = tick;
+            }
+            std::thread::sleep(pause);
+        }
+        let water = scene.water(surface);
+        let texels = water.texels().iter().map(|texel| [texel.film, texel.pores]).collect();
+        (texels, water.ledger(), changed)
+    };
+    // In the first run they are done long before their time, in the second perhaps not.
+    let (slow, fast) = (run(Duration::from_millis(20)), run(Duration::ZERO));
+    assert!(slow.2 > 10, "{}", slow.2);
+    assert_eq!((slow.1, slow.2), (fast.1, fast.2));
+    assert!(slow.0 == fast.0, "the water lies elsewhere");
 }
 
 #[test]

@@ -104,6 +104,13 @@ pub(super) fn build_colliders(
         let key = (handle.id(), uvs.copied().unwrap_or_default());
         known.entry(key).or_insert_with(|| MeshCollider { stale: true, ..default() });
     }
+    // One that never came and that nobody waits for any more would be waited for by all others.
+    known.retain(|key, collider| {
+        let is_idle = collider.stale && collider.task.is_none() && collider.built.is_none();
+        let is_wanted =
+            || wanting.iter().any(|(mesh, uvs)| (mesh.id(), uvs.copied().unwrap_or_default()) == *key);
+        !is_idle || is_wanted()
+    });
     for ((id, uvs), collider) in known.iter_mut() {
         if let Some(task) = &mut collider.task
             && let Some(built) = check_ready(task)
@@ -230,6 +237,18 @@ mod tests {
         assert!(Arc::ptr_eq(&bvh(one).unwrap(), &bvh(two).unwrap()));
         assert!(bvh(refused).is_none());
         assert_eq!(app.world().get::<NotWeatherable>(refused), Some(&NotWeatherable(TriangleError::NoUvs)));
+    }
+
+    #[test]
+    fn nobody_waits_for_a_mesh_whose_surface_went_before_it_came() {
+        let mut app = app();
+        let never = Mesh3d(app.world().resource::<Assets<Mesh>>().reserve_handle());
+        let surface = app.world_mut().spawn((Weatherable::default(), never, Transform::default())).id();
+        app.update();
+        assert_eq!(app.world().resource::<MeshColliders>().building(), 1);
+        app.world_mut().despawn(surface);
+        app.update();
+        assert_eq!(app.world().resource::<MeshColliders>().building(), 0);
     }
 
     #[test]

@@ -39,7 +39,7 @@ pub struct WeatherEffect {
     /// How fast it is swayed to and fro in still air, m/s; 0..=10. Flakes flutter. Needs drag.
     pub flutter: f32,
     /// Part of its water that an impact throws up again as two drops, 0..=0.5, if its drops are so large and fast that they
-    /// splash ([`splashes`](drops::splashes)).
+    /// splash ([`splashes`](drops::splashes)). Only where it carries nothing but water.
     pub splash: f32,
     /// Multiplies gravity: 1 falls, 0 floats.
     pub gravity_scale: f32,

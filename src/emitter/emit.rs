@@ -178,7 +178,8 @@ pub fn emit_particles(
     for &(number, entity) in order.iter() {
         twins = if stream.replace(number) == Some(number) { twins + 1 } else { 0 };
         let Ok((emitter, mut state, _)) = emitters.get_mut(entity) else { continue };
-        if !emitter.enabled || emitter.rate <= 0.0 {
+        // What is no number would stay in what is owed for ever.
+        if !emitter.enabled || !emitter.rate.is_finite() || emitter.rate <= 0.0 {
             continue;
         }
         let Some(effect) = effects.index_of(&emitter.effect) else { continue };
@@ -421,6 +422,32 @@ mod tests {
         assert_eq!(alone, run_with(&[0]));
         assert_eq!(alone, both.iter().copied().step_by(2).collect::<Vec<_>>(), "stream 0 goes first");
         assert_ne!(alone, run_with(&[1]));
+    }
+
+    #[test]
+    fn numbers_that_are_none_emit_nothing_and_are_forgotten() {
+        let mut world = world(60, WeatherEffect { volume_mm3: 4.0, ..default() });
+        let emitter = world.spawn(Emitter { rate: 600.0, ..default() }).id();
+        let set = |world: &mut World, rate: f32, flow: Flow| {
+            let mut emitter = world.get_mut::<Emitter>(emitter).unwrap();
+            (emitter.rate, emitter.flow) = (rate, flow);
+        };
+        for rate in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0] {
+            set(&mut world, rate, Flow::Effect);
+            run(&mut world, 3);
+            assert_eq!(emitted(&world), 0, "{rate}");
+        }
+        for litres in [f32::NAN, f32::INFINITY, -3.0] {
+            set(&mut world, 600.0, Flow::LitresPerMinute(litres));
+            let (before, water) = (emitted(&world), sent_nl(&world));
+            run(&mut world, 6);
+            assert_eq!((emitted(&world), sent_nl(&world)), (before + 60, water), "{litres}");
+        }
+        set(&mut world, 600.0, Flow::Effect);
+        let (before, water) = (emitted(&world), sent_nl(&world));
+        run(&mut world, 6);
+        assert_eq!((emitted(&world), sent_nl(&world)), (before + 60, water + 60 * 4000));
+        assert!(world.get::<EmitterState>(emitter).unwrap().is_sound(60));
     }
 
     #[test]

@@ -111,10 +111,14 @@ impl Emitter {
         self.mm3_per_second().is_some()
     }
 
-    /// What a particle carries, mm³, if all that are due are sent.
+    /// What a particle carries, mm³, if all that are due are sent: 0 to [`WeatherEffect::MAX_VOLUME_MM3`], and 0 if it is no finite
+    /// number.
     pub fn particle_mm3(&self, effect: &WeatherEffect) -> f32 {
-        let Some(mm3_per_second) = self.mm3_per_second() else { return effect.volume_mm3 };
-        (mm3_per_second / self.rate.max(1e-6)).clamp(0.0, WeatherEffect::MAX_VOLUME_MM3)
+        let mm3 = match self.mm3_per_second() {
+            Some(mm3_per_second) => mm3_per_second / self.rate.max(1e-6),
+            None => effect.volume_mm3,
+        };
+        if mm3.is_finite() { mm3.clamp(0.0, WeatherEffect::MAX_VOLUME_MM3) } else { 0.0 }
     }
 }
 

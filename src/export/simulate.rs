@@ -23,7 +23,7 @@ use crate::overlay::{
 use crate::particle::ParticleCounts;
 use crate::replay::{Progress, SurfaceMaps, WaterReport, headless, task_pools, water_of};
 use crate::weather::DryingClock;
-use crate::wetting::{Exposure, ExposureProgress, Now, SurfaceWater, WetGeometry};
+use crate::wetting::{Exposure, ExposureProgress, MeasureProgress, Now, SurfaceWater, WetGeometry};
 
 /// Seconds of wall-clock time after which surfaces that are not ready are given up.
 const PATIENCE_SECONDS: u64 = 600;
@@ -122,6 +122,7 @@ fn wait_until_ready(
         let mut unready = world.query_filtered::<(), (With<Number>, Unready)>();
         let waits = unready.iter(world).next().is_some()
             || world.resource::<MeshColliders>().building() > 0
+            || world.resource::<MeasureProgress>().is_busy()
             || world.resource::<ExposureProgress>().is_busy()
             || world.resource::<FramesWork>().is_busy();
         if !waits {

@@ -41,6 +41,8 @@ pub(crate) fn advance_matter(
         water.dried.clear();
         return 0;
     };
+    // Water that began anew while matter stayed: they share tiles.
+    water.wake(now.material.leaves_marks());
     bind_dried(water, matter);
     slide(water, matter, now, scratch) + melt(water, matter, now, weather, scratch)
 }
@@ -119,6 +121,26 @@ mod tests {
         assert_eq!(one.matter.ledger, other.matter.ledger);
         assert_eq!(one.scratch.falls, other.scratch.falls);
         assert_ne!(one.matter.texels, another.matter.texels);
+    }
+
+    #[test]
+    fn snow_goes_on_sliding_where_the_water_under_it_began_anew() {
+        let place = Place::slope(60.0, 32, 0.01).with(|weather| weather.temperature_c = -5.0);
+        let mut ground = Ground::dry(&place);
+        let heavy = Deposit {
+            center: [4096; 2],
+            radius: [15 * 256; 2],
+            kind: MatterKind::Snow,
+            volume_nl: 900_000_000,
+        };
+        ground.put(&place, 1, heavy);
+        ground.water.reset();
+        assert!(!ground.water.is_wet());
+        (2..=20 * Place::HZ).for_each(|tick| {
+            ground.step(&place, tick);
+        });
+        assert!(ground.matter.ledger.slid_off > 0);
+        assert_balanced(&ground.matter);
     }
 
     #[test]

@@ -236,6 +236,10 @@ fn throw_up(
     let speed = impact.velocity.dot(impact.normal).abs();
     let thrown_nl = (f64::from(water_nl) * f64::from(effect.splash)) as u32;
     let diameter = row.diameters_mm[usize::from(impact.class)];
+    // What a particle of mud throws up would be mud again, and soil come out of water.
+    if effect.carries != Carries::Water {
+        return 0;
+    }
     if thrown_nl < 2 * LEAST_THROWN_NL || new.waiting().len() + 2 > room || !splashes(diameter, speed) {
         return 0;
     }
@@ -380,5 +384,11 @@ mod tests {
         // Too slow, as what has been thrown up twice is; and where there is no room.
         assert_eq!(thrown(Vec3::NEG_Y * 8.0 * 0.35 * 0.35, 10), (0, 0));
         assert_eq!(thrown(Vec3::NEG_Y * 8.0, 1), (0, 0));
+        // Its water would come down as mud.
+        let mud = WeatherEffect { carries: Carries::Mud(0.4), ..effect.clone() };
+        let hit = Impact { velocity: Vec3::NEG_Y * 8.0, ..impact(Entity::PLACEHOLDER, 4) };
+        let mut new = NewParticles::default();
+        assert_eq!(throw_up(&hit, row, &mud, 4189, &clock, 10, &mut new), 0);
+        assert!(new.waiting().is_empty());
     }
 }

@@ -11,9 +11,11 @@ use bevy::world_serialization::WorldSerializationPlugin;
 
 use super::{ReplayError, ReplayOptions, failure};
 use crate::WeatheringPlugins;
+use crate::clock::WeatheringClock;
 use crate::offscreen;
 use crate::overlay::{CpuOverlayPlugin, GpuOverlayPlugin};
 use crate::scenario::ScenarioPlugin;
+use crate::wetting::MeasureTiming;
 
 /// Checks that there is a graphics driver: a clear error instead of a panic deep inside the renderer.
 ///
@@ -60,6 +62,9 @@ pub(super) fn build(options: &ReplayOptions, scenario: ScenarioPlugin) -> App {
         app = headless(tasks, assets);
     }
     app.add_plugins(scenario);
+    // A quarter of a second: long enough that a frame seldom has to wait.
+    let hz = app.world().resource::<WeatheringClock>().hz();
+    app.insert_resource(MeasureTiming::AfterTicks((hz / 4).max(1)));
     // A frame may be as long as it likes.
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(std::time::Duration::from_secs(86_400));
     app.finish();

@@ -21,7 +21,7 @@ use crate::material::{PlayedWetMap, Playing};
 use crate::overlay::{FramesWork, OverlayUv, PrepareStamps, TexelArea, Unmapped, Weatherable};
 use crate::particle::{Forces, ParticleConfig};
 use crate::unwrap::NotUnwrapped;
-use crate::wetting::{self, ExposureProgress, MeasureSurfaces};
+use crate::wetting::{self, ExposureProgress, MeasureProgress, MeasureSurfaces};
 
 /// Spawns a scenario and runs it once everything is loaded. Virtual time stands still until then.
 ///
@@ -296,8 +296,7 @@ fn watch_loading(
             Or<(Without<SurfaceCollider>, Without<TexelArea>, Without<wetting::Exposure>)>,
         ),
     >,
-    exposure: Res<ExposureProgress>,
-    frames: Res<FramesWork>,
+    (exposure, measuring, frames): (Res<ExposureProgress>, Res<MeasureProgress>, Res<FramesWork>),
     mut status: ResMut<ScenarioStatus>,
     mut time: ResMut<Time<Virtual>>,
 ) {
@@ -318,7 +317,8 @@ fn watch_loading(
         *status = ScenarioStatus::Failed(current.0.content_error(&field, value, reason));
         return;
     }
-    if unfinished.is_empty() && colliders.building() == 0 && !exposure.is_busy() && !frames.is_busy() {
+    let is_busy = colliders.building() > 0 || measuring.is_busy() || exposure.is_busy() || frames.is_busy();
+    if unfinished.is_empty() && !is_busy {
         *status = ScenarioStatus::Ready;
         time.unpause();
     }

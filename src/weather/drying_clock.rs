@@ -78,7 +78,8 @@ impl DryingClock {
         match self.points.last_mut() {
             Some(last) if last.per_tick == per_tick => {}
             Some(last) if last.tick == tick => *last = point,
-            Some(last) if count > 1 && tick - last.tick < hz => return false,
+            // Before the last change, too, if somebody has set the clock back: its past stays what it was.
+            Some(last) if tick < last.tick || (count > 1 && tick - last.tick < hz) => return false,
             _ => self.points.push(point),
         }
         if self.points.len() > Self::MAX_POINTS {
@@ -149,6 +150,15 @@ mod tests {
         assert_eq!(clock.until(36_000), hour);
         assert_eq!(clock.until(18_000).air_mm, hour.air_mm / 2.0);
         assert!((clock.until(72_000).air_mm - 4.0 * hourly.air_mm).abs() < 1e-12);
+    }
+
+    #[test]
+    fn weather_that_changes_after_the_clock_was_set_back_waits_and_spoils_nothing() {
+        let mut clock = DryingClock::default();
+        assert!(clock.change(&weather(1.0), 0, 60) && clock.change(&weather(2.0), 600, 60));
+        assert!(!clock.change(&weather(3.0), 10, 60));
+        assert!(DryingClock::from_points(clock.points().to_vec()).is_some());
+        assert!(clock.change(&weather(3.0), 700, 60));
     }
 
     #[test]

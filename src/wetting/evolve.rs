@@ -45,10 +45,9 @@ pub struct Amounts {
 /// The amounts `seconds` later, if the weather demands `demand_mm` during that time. Both 0 or more.
 pub fn evolve(before: Amounts, matter: Matter, seconds: f64, demand_mm: f64) -> Amounts {
     let Amounts { film_mm: film, pores_mm: pores, reserve_mm: reserve } = before;
-    // May hold more than its capacity: when the material was exchanged.
-    let full = matter.capacity_mm.max(pores);
+    let full = full_mm(pores, matter);
     let squared = matter.sorptivity_squared;
-    let soaked = if pores < full { (pores * pores + squared * seconds).sqrt().min(full) } else { full };
+    let soaked = taken_up(pores, matter, seconds);
     let left = film - (soaked - pores) - demand_mm;
     if left >= 0.0 {
         return Amounts { film_mm: left, pores_mm: soaked, reserve_mm: reserve };
@@ -62,6 +61,23 @@ pub fn evolve(before: Amounts, matter: Matter, seconds: f64, demand_mm: f64) -> 
         (demand_mm / seconds.max(1e-9), film_part(film, pores, full, squared, seconds, demand_mm));
     let soaked = (supply - rate * part * seconds).clamp(pores, full);
     dry_pores(soaked, reserve, matter.capacity_mm, demand_mm * (1.0 - part))
+}
+
+/// The film of [`evolve`] alone: the same to the bit, for less. All in mm.
+pub(crate) fn film_left(film: f64, pores: f64, matter: Matter, seconds: f64, demand_mm: f64) -> f64 {
+    // Not a number is no film.
+    (film - (taken_up(pores, matter, seconds) - pores) - demand_mm).max(0.0)
+}
+
+/// What the pores hold when they are full, mm. They may hold more than their capacity: when the material was exchanged.
+fn full_mm(pores: f64, matter: Matter) -> f64 {
+    matter.capacity_mm.max(pores)
+}
+
+/// What the pores hold after a time under a film that lasts, mm.
+fn taken_up(pores: f64, matter: Matter, seconds: f64) -> f64 {
+    let full = full_mm(pores, matter);
+    if pores < full { (pores * pores + matter.sorptivity_squared * seconds).sqrt().min(full) } else { full }
 }
 
 /// The part of the time after which a film that does not last is gone: the root of

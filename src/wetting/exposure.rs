@@ -13,10 +13,10 @@ use std::sync::Arc;
 
 use bevy::math::Affine3A;
 use bevy::prelude::*;
-use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+use bevy::tasks::{AsyncComputeTaskPool, Task};
 
 use super::points::surface_points;
-use super::{Now, SurfaceWater, TexelLayout, WetGeometry};
+use super::{MeasureTiming, Now, SurfaceWater, TexelLayout, WetGeometry};
 use crate::clock::WeatheringClock;
 use crate::collision::{CollisionScene, MeshBvh, MeshColliders, NotWeatherable, SurfaceCollider};
 use crate::material::PorousMaterial;
@@ -151,6 +151,10 @@ pub struct ExposureProgress {
     task: Option<Task<Vec<(Entity, Arc<TexelLayout>, Exposure)>>>,
     /// How many there were when it began.
     surfaces: usize,
+    /// The tick in which `task` was begun.
+    asked_at: u32,
+    /// Some of them had none before.
+    is_first: bool,
 }
 
 impl ExposureProgress {
@@ -198,14 +202,16 @@ pub(super) fn bake_exposure(
     clock: Res<WeatheringClock>,
     drying: Res<DryingClock>,
     weather: Res<Weather>,
-    colliders: Res<MeshColliders>,
+    (colliders, timing): (Res<MeshColliders>, Res<MeasureTiming>),
     mut progress: ResMut<ExposureProgress>,
     unmeasured: Query<(), Unmeasured>,
     mut surfaces: Query<Exposed>,
 ) {
-    if let Some(task) = &mut progress.task {
-        let Some(baked) = check_ready(task) else { return };
-        progress.task = None;
+    if progress.task.is_some() {
+        let is_first = progress.is_first || clock.tick() == 0;
+        let timing = if is_first { MeasureTiming::WhenReady } else { *timing };
+        let asked_at = progress.asked_at;
+        let Some(baked) = timing.take(&mut progress.task, asked_at, clock.tick()) else { return };
         for (entity, geometry, exposure) in baked {
             let Ok((_, current, _, _, mut water, material, old)) = surfaces.get_mut(entity) else { continue };
             if !Arc::ptr_eq(&geometry, current.0.layout()) {
@@ -243,7 +249,8 @@ pub(super) fn bake_exposure(
     if !wanted || count == 0 {
         return;
     }
-    progress.surfaces = count;
+    (progress.surfaces, progress.asked_at) = (count, clock.tick());
+    progress.is_first = surfaces.iter().any(|(.., exposure)| exposure.is_none());
     let mut jobs: Vec<Job> = Vec::new();
     let mut scene = Vec::new();
     for (surface, geometry, collider, transform, water, ..) in &surfaces {

@@ -5,7 +5,7 @@
 //! ([`evolve`]), worked out where somebody asks: here, when water moves, and in the shader. So matter absorbs and dries
 //! without any work, and a surface at rest costs nothing.
 //!
-//! Only what moves takes steps, on the tiles where it does: films run over the mesh (`run_off`), leave it as drips that
+//! Only what moves takes steps, on the tiles where it does: films run over the mesh (`flow`, `run_off`), leave it as drips that
 //! are particles again, and pores share what they hold ([`spread`]). When a shower is over, wet patches learn where their
 //! rim is, which dries first. [`Exposure`] says how well air and sun get at each texel, by rays.
 //!
@@ -27,6 +27,7 @@ mod drip;
 pub mod evolve;
 mod exposure;
 mod finder;
+mod flow;
 mod geometry;
 pub mod gpu;
 mod grid;
@@ -52,6 +53,7 @@ mod surface;
 mod test_meshes;
 mod texel;
 mod tick;
+mod timing;
 mod walk;
 
 use bevy::prelude::*;
@@ -66,14 +68,15 @@ pub use geometry::{Link, Side, TexelGeometry};
 pub use marks::Marks;
 pub use origin::Origin;
 pub use points::{SurfacePoint, surface_points};
-pub use prepare::WetGeometry;
 pub(crate) use prepare::{ExchangeMatter, put_matter};
+pub use prepare::{MeasureProgress, WetGeometry};
 pub use query::{BecameWet, Dried, SurfaceWetness, WatchWetness, Wetness, WetnessQuery};
 pub use ready::{Refusal, SurfaceReady, SurfaceRefused};
 pub use soak::Drop;
 pub use surface::{Ledger, Stock, SurfaceWater};
 pub use texel::{Scale, TexelWater, Units};
 pub use tick::WettingStats;
+pub use timing::MeasureTiming;
 
 pub(crate) use geometry::TexelLayout;
 #[cfg(test)]
@@ -104,6 +107,9 @@ impl Plugin for WettingPlugin {
             .register_required_components::<Weatherable, Dripping>()
             .register_type::<WatchWetness>()
             .register_type::<Origin>()
+            .register_type::<MeasureTiming>()
+            .init_resource::<MeasureTiming>()
+            .init_resource::<MeasureProgress>()
             .init_resource::<WettingStats>()
             .init_resource::<DripEffect>()
             .init_resource::<ExposureProgress>()

@@ -3,7 +3,7 @@
 //! Heights, slopes and distances of texels are measured again, in the background, when an edge of a triangle leans by some
 //! two degrees more or less than when they were measured last, and only while something lies on the surface that they can
 //! move. What lay still in a hollow is looked at again. A surface that moves all the time is measured over and over, as fast as that
-//! goes; until it is done water runs by the old slopes.
+//! goes; until it is done, or until a fixed tick ([`MeasureTiming`]), water runs by the old slopes.
 //!
 //! Links do not change with the pose, and areas are left as they are at rest, so that an amount keeps its depth: a film that
 //! is stretched gets no thinner. A pose with a vertex that is not a number, or a thousand kilometres away, is passed over.
@@ -12,10 +12,11 @@ use std::sync::Arc;
 
 use bevy::math::{Affine3A, Vec3A};
 use bevy::prelude::*;
-use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+use bevy::tasks::{AsyncComputeTaskPool, Task};
 
 use super::surface::Tiles;
-use super::{SurfaceWater, TexelGeometry, TexelLayout, WetGeometry};
+use super::{MeasureTiming, SurfaceWater, TexelGeometry, TexelLayout, WetGeometry};
+use crate::clock::WeatheringClock;
 use crate::collision::{DeformingCollider, PosedMesh, SurfaceCollider};
 use crate::matter::SurfaceMatter;
 use crate::overlay::Weatherable;
@@ -36,6 +37,8 @@ pub(super) struct PosedSlopes {
     /// It may have been posed since it was last looked at.
     unseen: bool,
     task: Option<Task<TexelGeometry>>,
+    /// The tick in which `task` was begun.
+    asked_at: u32,
 }
 
 impl PosedSlopes {
@@ -60,12 +63,19 @@ impl PosedSlopes {
         })
     }
 
-    /// Begins to measure.
-    fn measure(&mut self, posed: &PosedMesh, world_from_shape: Affine3A, rest: Arc<TexelGeometry>) {
+    /// Begins to measure, at this tick.
+    fn measure(
+        &mut self,
+        posed: &PosedMesh,
+        world_from_shape: Affine3A,
+        rest: Arc<TexelGeometry>,
+        tick: u32,
+    ) {
         let up = Vec3::from(world_from_shape.matrix3.transpose() * Vec3A::Y);
         self.heights.clear();
         self.heights.extend(posed.positions().iter().map(|position| up.dot(*position)));
         self.layout = rest.layout().clone();
+        self.asked_at = tick;
         // A copy of the places alone: whoever holds the shape itself keeps it from changing in place.
         let (mesh, positions) = (posed.mesh().clone(), posed.positions().to_vec());
         self.task = Some(AsyncComputeTaskPool::get().spawn(async move {
@@ -77,10 +87,14 @@ impl PosedSlopes {
         }));
     }
 
-    /// The slopes, once, when they are there and still wanted.
-    fn finished(&mut self, layout: &Arc<TexelLayout>) -> Option<TexelGeometry> {
-        let geometry = check_ready(self.task.as_mut()?)?;
-        self.task = None;
+    /// The slopes, once, when their time has come, if they are still wanted.
+    fn finished(
+        &mut self,
+        layout: &Arc<TexelLayout>,
+        timing: MeasureTiming,
+        tick: u32,
+    ) -> Option<TexelGeometry> {
+        let geometry = timing.take(&mut self.task, self.asked_at, tick)?;
         Arc::ptr_eq(geometry.layout(), layout).then_some(geometry)
     }
 }
@@ -98,6 +112,8 @@ type Posable = (
 /// Measures the slopes of surfaces that have taken another pose.
 pub(super) fn measure_posed_slopes(
     mut commands: Commands,
+    clock: Res<WeatheringClock>,
+    timing: Res<MeasureTiming>,
     mut surfaces: Query<
         Posable,
         (With<Weatherable>, With<SurfaceCollider>, Or<(With<DeformingCollider>, With<PosedSlopes>)>),
@@ -111,14 +127,14 @@ pub(super) fn measure_posed_slopes(
         };
         let Some(mut slopes) = slopes else {
             let layout = geometry.0.layout().clone();
-            let slopes = PosedSlopes { heights: Vec::new(), layout, unseen: true, task: None };
+            let slopes = PosedSlopes { heights: Vec::new(), layout, unseen: true, task: None, asked_at: 0 };
             commands.entity(entity).insert(slopes);
             continue;
         };
         if deforming.is_changed() || transform.is_changed() {
             slopes.unseen = true;
         }
-        if let Some(posed) = slopes.finished(geometry.0.layout()) {
+        if let Some(posed) = slopes.finished(geometry.0.layout(), *timing, clock.tick()) {
             geometry.0 = Arc::new(posed);
             // It is drawn as before until it moves.
             wake(
@@ -138,7 +154,7 @@ pub(super) fn measure_posed_slopes(
         slopes.unseen = false;
         let world_from_shape = deforming.world_from_shape(&transform);
         if slopes.differs(posed, &world_from_shape) {
-            slopes.measure(posed, world_from_shape, geometry.0.clone());
+            slopes.measure(posed, world_from_shape, geometry.0.clone(), clock.tick());
         }
     }
 }

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use bevy::ecs::system::SystemParam;
 use bevy::math::Mat3A;
 use bevy::prelude::*;
-use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+use bevy::tasks::{AsyncComputeTaskPool, Task};
 
 use super::posed::PosedSlopes;
-use super::{Dripping, DropQueue, Exposure, Now, SurfaceWater, TexelGeometry};
+use super::{Dripping, DropQueue, Exposure, Ledger, MeasureTiming, Now, SurfaceWater, TexelGeometry, Units};
 use crate::clock::WeatheringClock;
 use crate::collision::{DeformingCollider, MeshBvh, SurfaceCollider};
 use crate::material::PorousMaterial;
@@ -19,6 +19,19 @@ use crate::weather::DryingClock;
 /// The shape of a surface's texels, and which lie beside each other. Comes some frames after its collider.
 #[derive(Component, Clone)]
 pub struct WetGeometry(pub Arc<TexelGeometry>);
+
+/// How many surfaces are being measured, or may have to be.
+#[derive(Resource, Debug, Default)]
+pub struct MeasureProgress {
+    surfaces: usize,
+}
+
+impl MeasureProgress {
+    /// Whether any surface is being measured, or may have changed while it was.
+    pub fn is_busy(&self) -> bool {
+        self.surfaces > 0
+    }
+}
 
 /// What a geometry was, or is being, measured from.
 #[derive(Component)]
@@ -33,16 +46,11 @@ pub(super) struct Measured {
     /// A change may have come while it was being measured.
     late: bool,
     task: Option<Task<TexelGeometry>>,
+    /// The tick in which `task` was begun.
+    asked_at: u32,
 }
 
 impl Measured {
-    /// The geometry, once, when it is there.
-    fn finished(&mut self) -> Option<TexelGeometry> {
-        let geometry = check_ready(self.task.as_mut()?)?;
-        self.task = None;
-        Some(geometry)
-    }
-
     fn is_of(
         &self,
         map: (u32, [Wrap; 2]),
@@ -83,8 +91,11 @@ pub(super) fn measure_surfaces(
     mut commands: Commands,
     clock: Res<WeatheringClock>,
     drying: Res<DryingClock>,
+    timing: Res<MeasureTiming>,
+    mut progress: ResMut<MeasureProgress>,
     mut surfaces: Query<Measurable>,
 ) {
+    progress.surfaces = 0;
     for (entity, (surface, map), collider, texel, transform, mut measured, mut water, past, deforming) in
         &mut surfaces
     {
@@ -118,8 +129,10 @@ pub(super) fn measure_surfaces(
             let reshaped = measured
                 .as_ref()
                 .is_none_or(|old| (old.size, old.wrap) != (size, wrap) || !Arc::ptr_eq(&old.bvh, &bvh));
-            let measured = Measured { size, wrap, bvh, matrix, reshaped, late: false, task: Some(task) };
+            let (task, asked_at) = (Some(task), clock.tick());
+            let measured = Measured { size, wrap, bvh, matrix, reshaped, late: false, task, asked_at };
             commands.entity(entity).insert(measured);
+            progress.surfaces += 1;
             continue;
         }
         let Some(measured) = &mut measured else { continue };
@@ -129,7 +142,13 @@ pub(super) fn measure_surfaces(
             }
             continue;
         }
-        let Some(geometry) = measured.finished() else { continue };
+        // Until it is taken, and for one look more.
+        progress.surfaces += 1;
+        // Nothing has run on what is new, has become another surface, or waits for the first tick.
+        let is_new = measured.reshaped || clock.tick() == 0;
+        let timing = if is_new { MeasureTiming::WhenReady } else { *timing };
+        let asked_at = measured.asked_at;
+        let Some(geometry) = timing.take(&mut measured.task, asked_at, clock.tick()) else { continue };
         // It may have changed in the meantime.
         measured.late = true;
         if geometry.size() != size || measured.wrap != wrap || !Arc::ptr_eq(&measured.bvh, &collider.0) {
@@ -142,6 +161,9 @@ pub(super) fn measure_surfaces(
             let material = material.copied().unwrap_or_default();
             water.settle_all(&Now::new(clock.tick(), clock.hz(), &drying, &old.0, exposure, &material));
         }
+        if let Some(water) = &mut water {
+            choose_units(water, geometry.mean_mm2());
+        }
         let mut entity = commands.entity(entity);
         entity.insert(WetGeometry(Arc::new(geometry)));
         if measured.reshaped {
@@ -150,6 +172,17 @@ pub(super) fn measure_surfaces(
         if water.is_none() {
             entity.insert(SurfaceWater::of_size(size, wrap, texel.mean_mm2));
         }
+    }
+}
+
+/// Gives water units that fit texels of this mean area, mm², if those that it has do not: the surface has been scaled since. Only
+/// while nothing has ever come; what lies there is counted in the units it came in.
+fn choose_units(water: &mut SurfaceWater, mean_mm2: f32) {
+    let units = Units::for_area(mean_mm2);
+    let is_fresh = !water.is_wet() && water.ledger == Ledger::default();
+    // One step more or less is how the mean was measured.
+    if is_fresh && units.shift.abs_diff(water.units.shift) > 1 {
+        water.units = units;
     }
 }
 
@@ -251,4 +284,22 @@ pub(super) fn release_surface(removed: On<Remove, Weatherable>, mut commands: Co
         MatterQueue,
         FallingSnow,
     )>();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dry_surface_that_was_scaled_counts_in_units_of_its_size_and_a_wet_one_keeps_its_own() {
+        let mut water = SurfaceWater::of_size(16, [Wrap::Clamp; 2], 1.0);
+        let fine = water.units();
+        choose_units(&mut water, 2.5);
+        assert_eq!(water.units(), fine);
+        choose_units(&mut water, 900.0);
+        assert_eq!(water.units(), Units::for_area(900.0));
+        water.wake(false);
+        choose_units(&mut water, 1.0);
+        assert_eq!(water.units(), Units::for_area(900.0));
+    }
 }

@@ -4,7 +4,7 @@
 //! the fastest drop. So a texel under a hundred stamps is visited once.
 
 use super::arrivals::{Arrivals, Parcel};
-use super::run_off::LEAST_RETAINED;
+use super::flow::LEAST_RETAINED;
 use super::surface::{Now, SurfaceWater, Tiles};
 use crate::emitter::Source;
 use crate::matter::SurfaceMatter;

@@ -61,6 +61,9 @@ impl WettingStats {
     }
 }
 
+/// Tiles with films that may run, from which on a surface is worth several threads.
+const MANY_TILES: usize = 64;
+
 /// Buffers of one thread.
 #[derive(Default)]
 pub(super) struct Scratch {
@@ -84,7 +87,7 @@ type Surface = (
 );
 
 /// Soaks up what came, runs, spreads, and measures rims, on all surfaces that have something to do. Surfaces do not share
-/// texels, so they take their turns in parallel.
+/// texels, so they take their turns in parallel; where one of them is large, its tiles do.
 pub(super) fn advance_water(
     clock: Res<WeatheringClock>,
     drying: Res<DryingClock>,
@@ -146,6 +149,17 @@ pub(super) fn advance_water(
         stats.rims.fetch_add(u64::from(measured), Ordering::Relaxed);
     };
     let scratch = &*scratch;
+    // A single large one would keep one thread busy and leave the others idle: its tiles are shared out instead. It comes to the
+    // same water.
+    let is_large = |(water, ..): &SurfaceItem| water.tiles.running.len() >= MANY_TILES;
+    let mut large = busy.iter().enumerate().filter(|&(_, item)| is_large(item)).map(|(index, _)| index);
+    if let (Some(only), None) = (large.next(), large.next()) {
+        let item = busy.swap_remove(only);
+        let mut own = scratch.borrow_local_mut();
+        own.run.has_helpers = true;
+        advance(&mut own, item);
+        own.run.has_helpers = false;
+    }
     for_each_chunk(busy.drain(..), |item| advance(&mut scratch.borrow_local_mut(), item));
     *memory = reused(busy);
 }
