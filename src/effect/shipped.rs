@@ -46,7 +46,8 @@ pub struct ShippedEffect {
     pub name: &'static str,
     /// Its path for the asset server, such as [`WeatherEffect::RAIN`].
     pub path: &'static str,
-    ron: &'static str,
+    /// The text of its file.
+    pub ron: &'static str,
 }
 
 impl ShippedEffect {

@@ -293,11 +293,13 @@ mod tests {
         let mut stage = Stage::new(StandardMaterial::default());
         stage.wet(true);
         // Else the pipeline of the shadow would come too late, and the shadow be gone for a while.
-        assert!(!stage.world.entity(stage.understudies()[0]).contains::<NotShadowCaster>());
+        let first = stage.understudies()[0];
+        assert!(!stage.world.entity(first).contains::<NotShadowCaster>());
         let mut stage = Stage::new(StandardMaterial::default());
         stage.world.entity_mut(stage.surface).insert(NotShadowCaster);
         stage.wet(true);
-        assert!(stage.world.entity(stage.understudies()[0]).contains::<NotShadowCaster>());
+        let first = stage.understudies()[0];
+        assert!(stage.world.entity(first).contains::<NotShadowCaster>());
     }
 
     #[test]

@@ -22,7 +22,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 
 /// The file of an effect that comes with the project.
 pub fn text(name: &str) -> Option<&'static str> {
-    SHIPPED.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
+    ShippedEffect::named(name).map(|shipped| shipped.ron)
 }
 
 /// An effect that comes with the project.

@@ -221,11 +221,6 @@ pub fn give_up_moment(world: &mut World) {
     }
 }
 
-/// Whether maps are being read back or written.
-pub fn is_busy(world: &World) -> bool {
-    world.resource::<Saving>().0.is_some()
-}
-
 /// Reads a scene, and takes this one back to its beginning.
 fn begin_restoring(world: &mut World, folder: &Path) -> Result<(), SaveError> {
     let scene = Box::new(SavedScene::read(folder)?);
