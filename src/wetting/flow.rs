@@ -78,6 +78,8 @@ pub(super) struct Shed {
     pub(super) texel: u32,
     pub(super) site: DripSite,
     pub(super) water_nl: u32,
+    /// As of a [`Move`].
+    pub(super) gone: u32,
 }
 
 impl Default for Block {
@@ -175,6 +177,15 @@ struct Donor {
 }
 
 impl Donor {
+    /// Of its film at its reference time, units that are gone by now; for those who look at grains.
+    fn gone(&self, water: &SurfaceWater) -> u32 {
+        if !self.dusty {
+            return 0;
+        }
+        let stored = water.texels[self.texel as usize].film;
+        stored - ((f64::from(self.film) / self.unit_mm).round() as u32).min(stored)
+    }
+
     /// Number within its tile of the texel beside it in the image, if that lies in the tile.
     fn beside(&self, side: Side) -> Option<usize> {
         let (x, y) = (self.local % SIDE, self.local / SIDE);
@@ -233,7 +244,7 @@ pub(super) fn look_at(
         if let Some(site) = site
             && let Some(water_nl) = drop_nl(water, &donor)
         {
-            block.sheds.push(Shed { texel, site, water_nl });
+            block.sheds.push(Shed { texel, site, water_nl, gone: donor.gone(water) });
             // What drips cannot run, too.
             block.moves.truncate(first);
         }
@@ -303,12 +314,7 @@ fn give(
     let most = 0.9 * donor.excess;
     let scale = if sum > most { most / sum } else { 1.0 };
     let unit_mm = donor.unit_mm as f32;
-    let gone = if donor.dusty {
-        let stored = films.water.texels[donor.texel as usize].film;
-        stored - ((f64::from(donor.film) / donor.unit_mm).round() as u32).min(stored)
-    } else {
-        0
-    };
+    let gone = donor.gone(films.water);
     for (to, mm, inside, load) in out {
         let mm = mm * scale;
         let units = (mm / unit_mm) as u32;

@@ -349,7 +349,7 @@ mod tests {
     use bevy::window::WindowCloseRequested;
 
     use super::super::leave;
-    use super::super::ui::UiInput;
+    use super::super::ui::{Help, UiInput};
     use super::*;
 
     fn app() -> App {
@@ -357,6 +357,7 @@ mod tests {
         app.add_message::<WindowCloseRequested>()
             .init_resource::<ButtonInput<KeyCode>>()
             .init_resource::<UiInput>()
+            .init_resource::<Help>()
             .init_resource::<Note>()
             .init_resource::<Saving>();
         leave::plugin(&mut app);
