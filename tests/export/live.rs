@@ -1,6 +1,7 @@
 //! The present state of running apps, as scenes.
 
 use bevy::asset::RenderAssetUsages;
+use bevy::image::{ImageAddressMode, ImageSampler, ImageSamplerDescriptor};
 use bevy::mesh::VertexAttributeValues;
 use bevy::prelude::*;
 use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat};
@@ -19,7 +20,14 @@ fn bricks() -> Image {
     let size = Extent3d { width: 8, height: 8, depth_or_array_layers: 1 };
     let texels = (0..64).flat_map(texel).collect();
     let format = TextureFormat::Rgba8UnormSrgb;
-    Image::new(size, TextureDimension::D2, texels, format, RenderAssetUsages::default())
+    let mut image = Image::new(size, TextureDimension::D2, texels, format, RenderAssetUsages::default());
+    // Bevy's own sampler repeats the edge.
+    image.sampler = ImageSampler::Descriptor(ImageSamplerDescriptor {
+        address_mode_u: ImageAddressMode::Repeat,
+        address_mode_v: ImageAddressMode::Repeat,
+        ..ImageSamplerDescriptor::linear()
+    });
+    image
 }
 
 fn scene() -> Scene {
