@@ -16,7 +16,8 @@ use crate::wetting::scene::Scene;
 
 /// Bricks, 8 by 8 texels.
 fn bricks() -> Image {
-    let texel = |number: usize| if number % 3 == 0 { [90, 50, 40, 255] } else { [200, 120, 100, 255] };
+    let texel =
+        |number: usize| if number.is_multiple_of(3) { [90, 50, 40, 255] } else { [200, 120, 100, 255] };
     let size = Extent3d { width: 8, height: 8, depth_or_array_layers: 1 };
     let texels = (0..64).flat_map(texel).collect();
     let format = TextureFormat::Rgba8UnormSrgb;

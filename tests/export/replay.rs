@@ -33,8 +33,9 @@ fn garden(folder: &Path) -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets");
     fs::copy(root.join("models/bunny_1000.glb"), folder.join("bunny.glb")).unwrap();
     fs::copy(root.join("effects/hose.effect.ron"), folder.join("hose.effect.ron")).unwrap();
-    let texel =
-        |x: u32, y: u32| if (x / 4 + y / 4) % 2 == 0 { Rgb([150, 140, 130]) } else { Rgb([90, 85, 80]) };
+    let texel = |x: u32, y: u32| {
+        if (x / 4 + y / 4).is_multiple_of(2) { Rgb([150, 140, 130]) } else { Rgb([90, 85, 80]) }
+    };
     RgbImage::from_fn(16, 16, texel).save(folder.join("paving.png")).unwrap();
     let file = folder.join("garden.ron");
     fs::write(&file, SCENARIO).unwrap();

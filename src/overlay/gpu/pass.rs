@@ -60,7 +60,8 @@ impl SplatKinds {
             (in_space || stamps, "NEEDS_AXES"),
         ]
         .into_iter()
-        .filter_map(|(there, name)| there.then(|| name.into()))
+        .filter(|&(there, _)| there)
+        .map(|(_, name)| name.into())
         .collect()
     }
 }

@@ -24,7 +24,7 @@ const STAMPS_ALONG: u32 = 32;
 /// What every machine can do.
 const MAX_SIDE: u32 = 8192;
 
-const _: () = assert!(StampAtlas::MAX_STAMPS / STAMPS_ALONG * STAMP_SIZE as u32 <= MAX_SIDE);
+const _: () = assert!(StampAtlas::MAX_STAMPS / STAMPS_ALONG * STAMP_SIZE <= MAX_SIDE);
 const _: () = assert!(size_of::<StampTexel>() == 16);
 const _: () = assert!(size_of::<Splat>() == 7 * 16, "`SPLAT_TEXELS` in `shaders/splat.wgsl`");
 
@@ -117,7 +117,7 @@ impl<T: Pod> TexelRows<T> {
 
 /// The atlas as a texture; of an empty one a row of stamps with nothing on them.
 pub(super) fn stamp_texture(atlas: &StampAtlas, device: &RenderDevice, queue: &RenderQueue) -> TextureView {
-    let side = STAMP_SIZE as u32;
+    let side = STAMP_SIZE;
     let rows = atlas.len().div_ceil(STAMPS_ALONG).max(1);
     let size = [STAMPS_ALONG * side, rows * side];
     let texture = texture(device, "weathering stamps", TextureFormat::Rgba32Uint, size);

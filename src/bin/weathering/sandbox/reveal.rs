@@ -16,7 +16,7 @@ use bevy_weathering::scenario::ScenarioStatus;
 const FRAMES: u32 = 3;
 
 /// Seconds since the program began after which the window appears, whatever is in it.
-const PATIENCE: f32 = 4.0;
+const PATIENCE: f32 = 15.0;
 
 /// When the program began.
 #[derive(Resource)]

@@ -81,8 +81,9 @@ impl Saving {
 }
 
 fn press(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
-    let control = keys.any_pressed([KeyCode::ControlLeft, KeyCode::ControlRight]);
-    if control && keys.just_pressed(KeyCode::KeyS) {
+    // Also where a slow frame has seen it pressed and let go of.
+    let control = [KeyCode::ControlLeft, KeyCode::ControlRight];
+    if (keys.any_pressed(control) || keys.any_just_pressed(control)) && keys.just_pressed(KeyCode::KeyS) {
         commands.queue(save);
     }
 }
