@@ -1,7 +1,5 @@
 // The README's links are relative to the repository, and would lead nowhere from its documentation. Of two definitions of a
-// link Markdown takes the first, so these come before its own.
-//! [hose picture]: https://raw.githubusercontent.com/bevy-weathering/bevy_weathering/main/docs/pictures/hose.png
-//! [vase picture]: https://raw.githubusercontent.com/bevy-weathering/bevy_weathering/main/docs/pictures/vase.png
+// link Markdown takes the first, so these come before its own. Pictures stand inline, for those who read it as a file.
 //! [minimal]: https://github.com/bevy-weathering/bevy_weathering/blob/main/examples/minimal.rs
 //! [guide]: https://github.com/bevy-weathering/bevy_weathering/blob/main/docs/README.md
 //! [gallery]: https://github.com/bevy-weathering/bevy_weathering/blob/main/GALLERY.md
