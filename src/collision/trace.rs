@@ -5,7 +5,9 @@ use bevy::utils::Parallel;
 
 use super::{CollisionScene, Impact, Impacts};
 use crate::clock::WeatheringClock;
-use crate::particle::{Particles, chunk_len, for_each_chunk, swept_start};
+use crate::particle::{
+    BoxRows, Lifespan, Particles, ROW, chunk_len, for_each_chunk, swept_seconds, swept_start,
+};
 
 /// Below this many particles one thread is faster than waking others.
 const PARALLEL_BATCH: usize = 1024;
@@ -32,6 +34,7 @@ pub fn trace_particles(
         return;
     }
     let tick = clock.delta_secs();
+    let longest = swept_seconds(tick);
     let particles = particles.bypass_change_detection();
     let newborn = particles.newborn_from();
     let Particles { positions, velocities, lifespans, volumes_nl, sequences, effects, classes, .. } =
@@ -39,13 +42,14 @@ pub fn trace_particles(
     let len = chunk_len(positions.len(), PARALLEL_BATCH);
     let chunks = lifespans.chunks_mut(len).enumerate();
     let (scene, per_thread_found) = (&*scene, &*per_thread);
+    let reach = BoxRows::new(scene.bounds());
     for_each_chunk(chunks, |(chunk, lifespans)| {
         let mut found = per_thread_found.borrow_local_mut();
-        for (index, lifespan) in (chunk * len..).zip(lifespans) {
+        let mut trace = |index: usize, lifespan: &mut Lifespan| {
             let (end, velocity) = (positions[index], velocities[index]);
             let seconds = if index < newborn { tick } else { tick * lifespan.moving_part() };
             let start = swept_start(end, velocity, seconds);
-            let Some(hit) = scene.cast(start, end) else { continue };
+            let Some(hit) = scene.cast(start, end) else { return };
             lifespan.mark_hit();
             found.push(Impact {
                 sequence: sequences[index],
@@ -62,6 +66,27 @@ pub fn trace_particles(
                 class: classes[index],
                 volume_nl: volumes_nl[index],
             });
+        };
+        let here = chunk * len..chunk * len + lifespans.len();
+        let (ends, velocities) =
+            (positions[here.clone()].as_chunks::<ROW>(), velocities[here.clone()].as_chunks::<ROW>());
+        let (rows, rest) = lifespans.as_chunks_mut::<ROW>();
+        let first_of_rest = here.end - rest.len();
+        for (index, ((ends, velocities), lifespans)) in
+            here.step_by(ROW).zip(ends.0.iter().zip(velocities.0).zip(rows))
+        {
+            // Most are far from everything: this is all they cost. The newborn have come less far.
+            let touched = reach.touched(ends, velocities, longest);
+            if touched != 0 {
+                for (lane, lifespan) in lifespans.iter_mut().enumerate() {
+                    if touched >> (3 * lane) & 1 == 1 {
+                        trace(index + lane, lifespan);
+                    }
+                }
+            }
+        }
+        for (index, lifespan) in (first_of_rest..).zip(rest) {
+            trace(index, lifespan);
         }
     });
     for found in per_thread.iter_mut() {

@@ -1,8 +1,10 @@
 //! One step of motion: gravity, wind and drag.
 
+use bevy::math::Vec4;
 use bevy::prelude::*;
 
-use super::{Forces, Lifespan, Particles, Sequence, chunk_len, for_each_chunk};
+use super::rows::{MotionRows, ROW, Rows};
+use super::{Forces, Particles, Sequence, chunk_len, for_each_chunk};
 use crate::clock::WeatheringClock;
 use crate::effect::drops::SIZE_CLASSES;
 use crate::effect::{EffectIndex, EffectTable, WeatherEffect};
@@ -48,7 +50,44 @@ impl Motion {
 const STANDARD_GRAVITY: f32 = 9.81;
 
 /// Below this many particles one thread is faster than waking others.
-const PARALLEL_BATCH: usize = 4096;
+const PARALLEL_BATCH: usize = 16_384;
+
+/// Motions by effect and size class, and the air.
+#[derive(Clone, Copy)]
+struct Moving<'a> {
+    motions: &'a [[Motion; SIZE_CLASSES]],
+    wind: Vec3,
+    /// Since the beginning.
+    seconds: f32,
+}
+
+impl Moving<'_> {
+    fn motion(&self, effect: EffectIndex, class: u8) -> &Motion {
+        &self.motions[usize::from(effect.0)][usize::from(class) % SIZE_CLASSES]
+    }
+
+    fn air(&self, motion: &Motion, sequence: Sequence) -> Vec3 {
+        if motion.flutter > 0.0 { self.wind + motion.sway(sequence, self.seconds) } else { self.wind }
+    }
+
+    fn sways(&self, effects: &[EffectIndex; ROW]) -> bool {
+        effects.iter().any(|&effect| self.motion(effect, 0).flutter > 0.0)
+    }
+
+    fn rows(
+        &self,
+        effects: &[EffectIndex; ROW],
+        classes: &[u8; ROW],
+        sequences: &[Sequence; ROW],
+    ) -> MotionRows {
+        let motions: [&Motion; ROW] = std::array::from_fn(|lane| self.motion(effects[lane], classes[lane]));
+        MotionRows {
+            gravity: Rows::of(&motions.map(|motion| motion.gravity)),
+            air: Rows::of(&std::array::from_fn(|lane| self.air(motions[lane], sequences[lane]))),
+            drag: Vec4::from_array(motions.map(|motion| motion.drag)),
+        }
+    }
+}
 
 /// Accelerates every particle and moves it by what is left of its tick, which is one fewer to live.
 pub fn integrate_particles(
@@ -64,46 +103,50 @@ pub fn integrate_particles(
         Some(effect) => std::array::from_fn(|class| Motion::new(&forces, effect, row.terminal_speed(class))),
         None => [Motion::default(); SIZE_CLASSES],
     }));
-    let (motions, wind, tick) = (motions.as_slice(), weather.wind, clock.delta_secs());
+    let tick = clock.delta_secs();
     // Wraps after some hours, while an `f32` still knows hundredths.
     let seconds = (clock.tick() % (8192 * clock.hz())) as f32 / clock.hz() as f32;
+    let moving = Moving { motions: &motions, wind: weather.wind, seconds };
     let particles = particles.bypass_change_detection();
     let newborn = particles.newborn_from();
     let Particles { positions, velocities, lifespans, effects, classes, sequences, .. } = particles;
     let len = chunk_len(positions.len(), PARALLEL_BATCH);
     let columns = positions.chunks_mut(len).zip(velocities.chunks_mut(len)).zip(lifespans.chunks_mut(len));
     let kinds = effects.chunks(len).zip(classes.chunks(len)).zip(sequences.chunks(len));
-    for_each_chunk(columns.zip(kinds).enumerate(), |(chunk, (moving, kinds))| {
-        let ((positions, velocities), lifespans) = moving;
+    for_each_chunk(columns.zip(kinds).enumerate(), |(chunk, (columns, kinds))| {
+        let ((positions, velocities), lifespans) = columns;
         let ((effects, classes), sequences) = kinds;
-        let old = newborn.saturating_sub(chunk * len).min(positions.len());
-        let mut kind = (EffectIndex(u16::MAX), u8::MAX);
-        let mut motion = Motion::default();
-        let mut advance = |index: usize, lifespan: &mut Lifespan, dt: f32| {
+        for lifespan in lifespans.iter_mut() {
             lifespan.ticks_left = lifespan.ticks_left.saturating_sub(1);
-            // Neighbours are mostly of one kind.
-            if (effects[index], classes[index]) != kind {
-                kind = (effects[index], classes[index]);
-                motion = motions[usize::from(kind.0.0)][usize::from(kind.1) % SIZE_CLASSES];
-            }
-            let air = if motion.flutter > 0.0 { wind + motion.sway(sequences[index], seconds) } else { wind };
-            velocities[index] = motion.step(velocities[index], air, dt);
-            positions[index] += velocities[index] * dt;
-        };
-        let (grown, born) = lifespans.split_at_mut(old);
-        for (index, lifespan) in grown.iter_mut().enumerate() {
-            advance(index, lifespan, tick);
         }
-        for (index, lifespan) in (old..).zip(born) {
-            let dt = tick * lifespan.moving_part();
-            advance(index, lifespan, dt);
+        let old = newborn.saturating_sub(chunk * len).min(positions.len());
+        let (whole, _) = positions[..old].as_chunks_mut::<ROW>();
+        let by_itself = whole.len() * ROW;
+        let whole = whole.iter_mut().zip(velocities.as_chunks_mut::<ROW>().0);
+        let kinds = effects.as_chunks::<ROW>().0.iter().zip(classes.as_chunks::<ROW>().0);
+        let kinds = kinds.zip(sequences.as_chunks::<ROW>().0);
+        let (mut kind, mut rows) = (None, MotionRows::default());
+        for ((positions, velocities), ((effects, classes), sequences)) in whole.zip(kinds) {
+            // Neighbours are mostly of one kind.
+            if kind != Some((effects, classes)) {
+                rows = moving.rows(effects, classes, sequences);
+                // What sways does so each in its own way.
+                kind = (!moving.sways(effects)).then_some((effects, classes));
+            }
+            rows.advance(positions, velocities, tick);
+        }
+        for index in by_itself..positions.len() {
+            let dt = if index < old { tick } else { tick * lifespans[index].moving_part() };
+            let motion = moving.motion(effects[index], classes[index]);
+            velocities[index] = motion.step(velocities[index], moving.air(motion, sequences[index]), dt);
+            positions[index] += velocities[index] * dt;
         }
     });
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::Particle;
+    use super::super::{Lifespan, Particle};
     use super::*;
 
     fn world_with(effect: WeatherEffect, forces: Forces) -> (World, EffectIndex) {
@@ -185,6 +228,71 @@ mod tests {
         }
         assert!((0.2..0.45).contains(&fastest) && (0.02..0.5).contains(&farthest), "{fastest} {farthest}");
         assert!((velocity(&world).y + 1.0).abs() < 0.2, "{}", velocity(&world));
+    }
+
+    #[test]
+    fn four_together_move_as_each_would_alone() {
+        let mut random = 1u32;
+        let mut next = |scale: f32| {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            ((random >> 8) as f32 / 8_388_608.0 - 1.0) * scale
+        };
+        for _ in 0..1000 {
+            let mut vector = |scale: f32| Vec3::new(next(scale), next(scale), next(scale));
+            let (mut positions, mut velocities) =
+                ([(); ROW].map(|()| vector(9.0)), [(); ROW].map(|()| vector(20.0)));
+            let airs = [(); ROW].map(|()| vector(15.0));
+            let motions =
+                [(); ROW].map(|()| Motion { gravity: vector(10.0), drag: vector(2.0).x.abs(), flutter: 0.0 });
+            let alone: [(Vec3, Vec3); ROW] = std::array::from_fn(|lane| {
+                let velocity = motions[lane].step(velocities[lane], airs[lane], 1.0 / 60.0);
+                (positions[lane] + velocity * (1.0 / 60.0), velocity)
+            });
+            let rows = MotionRows {
+                gravity: Rows::of(&motions.map(|motion| motion.gravity)),
+                air: Rows::of(&airs),
+                drag: Vec4::from_array(motions.map(|motion| motion.drag)),
+            };
+            rows.advance(&mut positions, &mut velocities, 1.0 / 60.0);
+            let together: [(Vec3, Vec3); ROW] =
+                std::array::from_fn(|lane| (positions[lane], velocities[lane]));
+            assert_eq!(together, alone);
+        }
+    }
+
+    #[test]
+    fn a_crowd_of_many_kinds_moves_as_its_members_do() {
+        let effect =
+            |speed: f32, flutter: f32| WeatherEffect { terminal_speed: Some(speed), flutter, ..default() };
+        let (mut world, first) = world_with(effect(6.0, 0.0), Forces::default());
+        let other = Handle::Uuid(bevy::asset::uuid::Uuid::from_u128(9), std::marker::PhantomData);
+        let second = world.resource_mut::<EffectTable>().insert(other, effect(1.0, 0.4)).unwrap();
+        let particle = |number: u32| Particle {
+            position: Vec3::ZERO,
+            velocity: Vec3::new(1.0, -(number as f32), 0.5),
+            lifespan: Lifespan { ticks_left: 9, born_at: 0 },
+            volume_nl: 1,
+            sequence: Sequence(number),
+            effect: if number % 11 < 8 { first } else { second },
+            class: 0,
+        };
+        let moved = |world: &mut World, number: std::ops::Range<u32>| {
+            world.resource_mut::<Particles>().clear();
+            world.resource_mut::<Particles>().spawn(number.map(particle));
+            // The tick of their birth is over.
+            world.resource_mut::<Particles>().retire(|_| {});
+            run(world, 1);
+            let particles = world.resource::<Particles>();
+            particles
+                .positions()
+                .iter()
+                .copied()
+                .zip(particles.velocities().iter().copied())
+                .collect::<Vec<_>>()
+        };
+        let together = moved(&mut world, 0..67);
+        let alone: Vec<_> = (0..67).flat_map(|number| moved(&mut world, number..number + 1)).collect();
+        assert_eq!(together, alone);
     }
 
     #[test]

@@ -19,6 +19,7 @@ mod draw;
 mod integrate;
 mod pool;
 mod retire;
+mod rows;
 
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -35,6 +36,7 @@ pub use integrate::integrate_particles;
 pub use pool::{Particle, Particles};
 pub(crate) use pool::{SavedParticle, chunk_len, for_each_chunk};
 pub use retire::retire_particles;
+pub(crate) use rows::{BoxRows, ROW};
 
 /// How long a particle has left, and when within its first tick it was born.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,7 +80,12 @@ impl Lifespan {
 /// Where the segment that ended at `position` began. The way back is longer by 1e-4 of the segment than the way
 /// there, so that consecutive segments overlap and nothing slips between them.
 pub fn swept_start(position: Vec3, velocity: Vec3, seconds_moved: f32) -> Vec3 {
-    position - velocity * (seconds_moved * 1.0001)
+    position - velocity * swept_seconds(seconds_moved)
+}
+
+/// How long the way back of [`swept_start`] takes.
+pub(crate) fn swept_seconds(seconds_moved: f32) -> f32 {
+    seconds_moved * 1.0001
 }
 
 /// Gravity, the same everywhere. The wind is the [`Weather`]'s.
