@@ -77,6 +77,7 @@ pub use soak::Drop;
 pub use surface::{Ledger, Stock, SurfaceWater};
 pub use texel::{Scale, TexelWater, Units};
 pub use tick::WettingStats;
+pub(crate) use timing::MeasureTimer;
 pub use timing::MeasureTiming;
 
 pub(crate) use geometry::TexelLayout;

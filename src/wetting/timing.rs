@@ -1,10 +1,14 @@
 //! When what is measured in the background takes effect.
 
+use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 use bevy::tasks::{Task, block_on, futures::check_ready};
 
-/// When surfaces that are new, turn, change their size or take another pose run by what was measured of them, and when they dry by a
-/// sun that has moved. Until then it is the old slopes and shadows that count, and of what is new, none.
+use crate::clock::WeatheringClock;
+
+/// When meshes that are loaded or change are hit as they are, when surfaces that are new, turn, change their size or take another pose
+/// run by what was measured of them, and when they dry by a sun that has moved. Until then it is the old shape, slopes and shadows
+/// that count, and of what is new, none.
 #[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[reflect(Resource)]
 pub enum MeasureTiming {
@@ -33,6 +37,25 @@ impl MeasureTiming {
         };
         *task = None;
         Some(found)
+    }
+}
+
+/// [`MeasureTiming`] and the time, for systems that may run without either.
+#[derive(SystemParam)]
+pub(crate) struct MeasureTimer<'w> {
+    timing: Option<Res<'w, MeasureTiming>>,
+    clock: Option<Res<'w, WeatheringClock>>,
+}
+
+impl MeasureTimer<'_> {
+    /// The present tick: that in which a task is begun.
+    pub(crate) fn tick(&self) -> u32 {
+        self.clock.as_deref().map_or(0, WeatheringClock::tick)
+    }
+
+    /// As [`MeasureTiming::take`].
+    pub(crate) fn take<T: Send + 'static>(&self, task: &mut Option<Task<T>>, asked_at: u32) -> Option<T> {
+        self.timing.as_deref().copied().unwrap_or_default().take(task, asked_at, self.tick())
     }
 }
 
