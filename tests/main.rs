@@ -90,6 +90,8 @@ mod refusals;
 mod reload;
 /// The program as its users run it: output, errors, exit codes.
 mod replay;
+/// Starting over, and what is measured meanwhile.
+mod resets;
 /// Scenes that are saved and gone on with, and accounts of all water.
 mod save;
 /// What the parts are together: order, independence of a renderer.

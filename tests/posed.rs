@@ -238,7 +238,7 @@ fn water_runs_down_the_pose_and_drips_from_its_edge() {
 }
 
 /// How much lower the second end of a plank lies than its first, by its slopes, metres.
-fn fall(world: &World, surface: Entity) -> f32 {
+pub fn fall(world: &World, surface: Entity) -> f32 {
     let heights = world.get::<WetGeometry>(surface).unwrap().0.height();
     let row = SIZE as usize / 2 * SIZE as usize;
     heights[row + 25] - heights[row + 243]

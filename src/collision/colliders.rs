@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
-use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+use bevy::tasks::{AsyncComputeTaskPool, Task};
 
 use super::{AwaitsUvs, Deformer, MeshBvh, MeshTriangles, TriangleError, TriangleReport, UvSet};
 use crate::overlay::Weatherable;
+use crate::wetting::MeasureTimer;
 
 /// The BVH of this entity's mesh. Added to every [`Weatherable`] entity once it is built.
 #[derive(Component, Clone)]
@@ -36,6 +37,8 @@ pub struct MeshColliders {
 struct MeshCollider {
     built: Option<Built>,
     task: Option<Task<Built>>,
+    /// The tick in which `task` was begun.
+    asked_at: u32,
     /// The mesh has changed since the last build began.
     stale: bool,
 }
@@ -96,6 +99,7 @@ pub(super) fn watch_meshes(
 pub(super) fn build_colliders(
     meshes: Res<Assets<Mesh>>,
     assets: Option<Res<AssetServer>>,
+    timer: MeasureTimer,
     mut colliders: ResMut<MeshColliders>,
     wanting: Query<(&Mesh3d, Option<&UvSet>), Wanting>,
 ) {
@@ -112,10 +116,8 @@ pub(super) fn build_colliders(
         !is_idle || is_wanted()
     });
     for ((id, uvs), collider) in known.iter_mut() {
-        if let Some(task) = &mut collider.task
-            && let Some(built) = check_ready(task)
-        {
-            (collider.built, collider.task, *news) = (Some(built), None, true);
+        if let Some(built) = timer.take(&mut collider.task, collider.asked_at) {
+            (collider.built, *news) = (Some(built), true);
         }
         // A mesh that changes every frame is built as fast as it goes, one after the other.
         if !collider.stale || collider.task.is_some() {
@@ -130,6 +132,7 @@ pub(super) fn build_colliders(
                     let build =
                         async move { Ok(Arc::new(MeshBvh::build(triangles).with_deformer(deformer))) };
                     collider.task = Some(AsyncComputeTaskPool::get().spawn(build));
+                    collider.asked_at = timer.tick();
                 }
                 Err(error) => (collider.built, *news) = (Some(Err(error)), true),
             }

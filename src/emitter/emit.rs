@@ -177,9 +177,10 @@ pub fn emit_particles(
     let (mut stream, mut twins) = (None, 0u32);
     for &(number, entity) in order.iter() {
         twins = if stream.replace(number) == Some(number) { twins + 1 } else { 0 };
-        let Ok((emitter, mut state, _)) = emitters.get_mut(entity) else { continue };
-        // What is no number would stay in what is owed for ever.
-        if !emitter.enabled || !emitter.rate.is_finite() || emitter.rate <= 0.0 {
+        let Ok((emitter, mut state, transform)) = emitters.get_mut(entity) else { continue };
+        // What is no number would stay in what is owed for ever, or be where nothing is.
+        let is_sound = emitter.is_finite() && transform.affine().is_finite();
+        if !emitter.enabled || emitter.rate <= 0.0 || !is_sound {
             continue;
         }
         let Some(effect) = effects.index_of(&emitter.effect) else { continue };
@@ -437,6 +438,21 @@ mod tests {
             run(&mut world, 3);
             assert_eq!(emitted(&world), 0, "{rate}");
         }
+        let sound = Emitter { rate: 600.0, ..default() };
+        let half_size = Vec2::new(1.0, f32::NAN);
+        for wrong in [
+            Emitter { speed: f32::NAN, ..sound.clone() },
+            Emitter { spread: f32::INFINITY, ..sound.clone() },
+            Emitter { shape: EmitterShape::Cone { radius: f32::NAN }, ..sound.clone() },
+            Emitter { shape: EmitterShape::Sky { half_size }, ..sound.clone() },
+        ] {
+            *world.get_mut::<Emitter>(emitter).unwrap() = wrong;
+            run(&mut world, 3);
+        }
+        world.entity_mut(emitter).insert((sound, GlobalTransform::from_xyz(0.0, f32::NAN, 0.0)));
+        run(&mut world, 3);
+        assert_eq!(emitted(&world), 0);
+        world.entity_mut(emitter).insert(GlobalTransform::IDENTITY);
         for litres in [f32::NAN, f32::INFINITY, -3.0] {
             set(&mut world, 600.0, Flow::LitresPerMinute(litres));
             let (before, water) = (emitted(&world), sent_nl(&world));

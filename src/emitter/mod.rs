@@ -111,6 +111,17 @@ impl Emitter {
         self.mm3_per_second().is_some()
     }
 
+    /// Whether what says when, where and how fast its particles begin are numbers.
+    fn is_finite(&self) -> bool {
+        let shape = match self.shape {
+            EmitterShape::Point => true,
+            EmitterShape::Cone { radius } | EmitterShape::Disc { radius } => radius.is_finite(),
+            EmitterShape::Box { half_size } => half_size.is_finite(),
+            EmitterShape::Sky { half_size } => half_size.is_finite(),
+        };
+        shape && [self.rate, self.speed, self.spread].into_iter().all(f32::is_finite)
+    }
+
     /// What a particle carries, mm³, if all that are due are sent: 0 to [`WeatherEffect::MAX_VOLUME_MM3`], and 0 if it is no finite
     /// number.
     pub fn particle_mm3(&self, effect: &WeatherEffect) -> f32 {

@@ -252,7 +252,7 @@ impl Recording {
         let mut is_past = tick <= self.end;
         for what in actions {
             let event = EventSpec { at, what };
-            if let Err(error) = self.loaded.validate_event("events[_]", &event) {
+            if let Err(error) = self.loaded.validate_new_event("events[_]", &event) {
                 self.add_note(error.to_string());
                 continue;
             }

@@ -10,10 +10,10 @@ use crate::matter::{FallingSnow, MatterQueue, SurfaceMatter};
 use crate::overlay::{CpuMaps, MapLoss, Overlays, SplatQueue, SurfaceTotals, SurfaceTraces, Weatherable};
 use crate::particle::{ParticleCounts, Particles, Splashes, WaterCounts};
 use crate::weather::DryingClock;
-use crate::wetting::{DropQueue, SurfaceWater};
+use crate::wetting::{DropQueue, ExposureProgress, SurfaceWater, forget_poses};
 
-/// Takes a scenario back to tick 0: dry surfaces, no particles, the same random streams. What follows is what
-/// followed the first time.
+/// Takes a scenario back to tick 0: dry surfaces, no particles, the same random streams, slopes of the mesh at rest. What
+/// follows is what followed the first time, if a frame without a tick comes first. Whoever moves surfaces puts them back.
 pub fn reset_scenario(world: &mut World) {
     world.resource_mut::<Particles>().clear();
     let mut emitters = world.query_filtered::<&mut EmitterState, With<Emitter>>();
@@ -66,6 +66,11 @@ pub fn reset_scenario(world: &mut World) {
     world.insert_resource(DryingClock::default());
     world.insert_resource(Digest::default());
     rewind(world, 0);
+    forget_poses(world);
+    // By the sun of the end.
+    if let Some(mut exposure) = world.get_resource_mut::<ExposureProgress>() {
+        exposure.start_over();
+    }
     if let Some(mut splashes) = world.get_resource_mut::<Splashes>() {
         *splashes = Splashes::default();
     }

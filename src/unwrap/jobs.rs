@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 
 use bevy::prelude::*;
-use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+use bevy::tasks::{AsyncComputeTaskPool, Task};
 
 use super::{UniqueUvs, UnwrapError, UnwrapOptions, Wanting, unique_uvs};
 use crate::collision::UvSet;
 use crate::overlay::{OverlayUv, Weatherable};
+use crate::wetting::MeasureTimer;
 
 /// A mesh, and how it is unwrapped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -30,6 +31,8 @@ pub struct Unwraps {
 #[derive(Default)]
 pub(super) struct Job {
     task: Option<Task<Result<UniqueUvs, UnwrapError>>>,
+    /// The tick in which `task` was begun.
+    asked_at: u32,
     /// The mesh has changed since the last task began.
     stale: bool,
     pub(super) outcome: Option<Outcome>,
@@ -149,6 +152,7 @@ pub(super) fn watch_meshes(mut events: MessageReader<AssetEvent<Mesh>>, mut unwr
 pub(super) fn run_unwraps(
     mut meshes: ResMut<Assets<Mesh>>,
     assets: Option<Res<AssetServer>>,
+    timer: MeasureTimer,
     mut unwraps: ResMut<Unwraps>,
     wanting: Query<(&Weatherable, &Mesh3d), Wanting>,
 ) {
@@ -165,10 +169,8 @@ pub(super) fn run_unwraps(
     }
     let Unwraps { jobs, made, news } = &mut *unwraps;
     for (key, job) in jobs.iter_mut() {
-        if let Some(task) = &mut job.task
-            && let Some(result) = check_ready(task)
-        {
-            (job.task, *news) = (None, true);
+        if let Some(result) = timer.take(&mut job.task, job.asked_at) {
+            *news = true;
             job.finish(result, &mut meshes);
             if let Some(copy) = &job.fresh {
                 made.insert(copy.id(), *key);
@@ -182,7 +184,8 @@ pub(super) fn run_unwraps(
         if let Some(mesh) = meshes.get(key.mesh) {
             let (mesh, options) = (mesh.clone(), key.options);
             let look = async move { unique_uvs(&mesh, &options) };
-            (job.stale, job.task) = (false, Some(AsyncComputeTaskPool::get().spawn(look)));
+            (job.stale, job.asked_at) = (false, timer.tick());
+            job.task = Some(AsyncComputeTaskPool::get().spawn(look));
         } else if load().is_some_and(|state| state.is_failed()) {
             (job.stale, *news) = (false, true);
             job.outcome = Some(Outcome::Refused(UnwrapError::NotLoaded));

@@ -153,14 +153,19 @@ pub struct ExposureProgress {
     surfaces: usize,
     /// The tick in which `task` was begun.
     asked_at: u32,
-    /// Some of them had none before.
-    is_first: bool,
 }
 
 impl ExposureProgress {
     /// Whether rays are being cast.
     pub fn is_busy(&self) -> bool {
         self.task.is_some()
+    }
+
+    /// What is under way is of no use any more: all that is wanted is begun anew.
+    pub(crate) fn start_over(&mut self) {
+        if self.task.is_some() {
+            *self = Self::default();
+        }
     }
 }
 
@@ -208,8 +213,6 @@ pub(super) fn bake_exposure(
     mut surfaces: Query<Exposed>,
 ) {
     if progress.task.is_some() {
-        let is_first = progress.is_first || clock.tick() == 0;
-        let timing = if is_first { MeasureTiming::WhenReady } else { *timing };
         let asked_at = progress.asked_at;
         let Some(baked) = timing.take(&mut progress.task, asked_at, clock.tick()) else { return };
         for (entity, geometry, exposure) in baked {
@@ -250,7 +253,6 @@ pub(super) fn bake_exposure(
         return;
     }
     (progress.surfaces, progress.asked_at) = (count, clock.tick());
-    progress.is_first = surfaces.iter().any(|(.., exposure)| exposure.is_none());
     let mut jobs: Vec<Job> = Vec::new();
     let mut scene = Vec::new();
     for (surface, geometry, collider, transform, water, ..) in &surfaces {

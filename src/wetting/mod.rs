@@ -68,6 +68,7 @@ pub use geometry::{Link, Side, TexelGeometry};
 pub use marks::Marks;
 pub use origin::Origin;
 pub use points::{SurfacePoint, surface_points};
+pub(crate) use posed::forget_poses;
 pub(crate) use prepare::{ExchangeMatter, put_matter};
 pub use prepare::{MeasureProgress, WetGeometry};
 pub use query::{BecameWet, Dried, SurfaceWetness, WatchWetness, Wetness, WetnessQuery};
@@ -76,6 +77,7 @@ pub use soak::Drop;
 pub use surface::{Ledger, Stock, SurfaceWater};
 pub use texel::{Scale, TexelWater, Units};
 pub use tick::WettingStats;
+pub(crate) use timing::MeasureTimer;
 pub use timing::MeasureTiming;
 
 pub(crate) use geometry::TexelLayout;

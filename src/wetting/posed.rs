@@ -32,8 +32,8 @@ const FARTHEST: f32 = 1.0e6;
 pub(super) struct PosedSlopes {
     /// Of its vertices, metres above anything.
     heights: Vec<f32>,
-    /// What the slopes belong to.
-    layout: Arc<TexelLayout>,
+    /// The surface at rest: it begins with the slopes of that.
+    rest: Arc<TexelGeometry>,
     /// It may have been posed since it was last looked at.
     unseen: bool,
     task: Option<Task<TexelGeometry>>,
@@ -42,6 +42,11 @@ pub(super) struct PosedSlopes {
 }
 
 impl PosedSlopes {
+    /// None are known but those at rest.
+    fn at_rest(rest: Arc<TexelGeometry>) -> Self {
+        Self { heights: Vec::new(), rest, unseen: true, task: None, asked_at: 0 }
+    }
+
     /// Whether the pose leans so much differently from the last one measured that slopes are another matter. One that is
     /// nonsense does not.
     fn differs(&self, posed: &PosedMesh, world_from_shape: &Affine3A) -> bool {
@@ -64,20 +69,13 @@ impl PosedSlopes {
     }
 
     /// Begins to measure, at this tick.
-    fn measure(
-        &mut self,
-        posed: &PosedMesh,
-        world_from_shape: Affine3A,
-        rest: Arc<TexelGeometry>,
-        tick: u32,
-    ) {
+    fn measure(&mut self, posed: &PosedMesh, world_from_shape: Affine3A, tick: u32) {
         let up = Vec3::from(world_from_shape.matrix3.transpose() * Vec3A::Y);
         self.heights.clear();
         self.heights.extend(posed.positions().iter().map(|position| up.dot(*position)));
-        self.layout = rest.layout().clone();
         self.asked_at = tick;
         // A copy of the places alone: whoever holds the shape itself keeps it from changing in place.
-        let (mesh, positions) = (posed.mesh().clone(), posed.positions().to_vec());
+        let (mesh, positions, rest) = (posed.mesh().clone(), posed.positions().to_vec(), self.rest.clone());
         self.task = Some(AsyncComputeTaskPool::get().spawn(async move {
             let place = |vertex: u32| world_from_shape.transform_point3(positions[vertex as usize]);
             let vertices = mesh.deformer().map_or(&[][..], |deformer| &deformer.corners()[..]);
@@ -126,9 +124,7 @@ pub(super) fn measure_posed_slopes(
             continue;
         };
         let Some(mut slopes) = slopes else {
-            let layout = geometry.0.layout().clone();
-            let slopes = PosedSlopes { heights: Vec::new(), layout, unseen: true, task: None, asked_at: 0 };
-            commands.entity(entity).insert(slopes);
+            commands.entity(entity).insert(PosedSlopes::at_rest(geometry.0.clone()));
             continue;
         };
         if deforming.is_changed() || transform.is_changed() {
@@ -142,10 +138,9 @@ pub(super) fn measure_posed_slopes(
                 matter.as_mut().map(|matter| matter.bypass_change_detection()),
             );
         }
-        if !Arc::ptr_eq(&slopes.layout, geometry.0.layout()) {
-            // Measured anew, at rest.
-            slopes.heights.clear();
-            (slopes.layout, slopes.unseen) = (geometry.0.layout().clone(), true);
+        if !Arc::ptr_eq(slopes.rest.layout(), geometry.0.layout()) {
+            // Measured anew, at rest. What is being measured still is of no use.
+            *slopes = PosedSlopes::at_rest(geometry.0.clone());
         }
         if !slopes.unseen || slopes.task.is_some() || !may_move(&water, matter.as_deref()) {
             continue;
@@ -154,8 +149,20 @@ pub(super) fn measure_posed_slopes(
         slopes.unseen = false;
         let world_from_shape = deforming.world_from_shape(&transform);
         if slopes.differs(posed, &world_from_shape) {
-            slopes.measure(posed, world_from_shape, geometry.0.clone(), clock.tick());
+            slopes.measure(posed, world_from_shape, clock.tick());
         }
+    }
+}
+
+/// Water runs by the slopes at rest again, as before a pose was measured for the first time.
+pub(crate) fn forget_poses(world: &mut World) {
+    let mut surfaces = world.query::<(&mut WetGeometry, &mut PosedSlopes)>();
+    for (mut geometry, mut slopes) in surfaces.iter_mut(world) {
+        // Else it was measured anew, at rest, and that has not been seen yet.
+        if Arc::ptr_eq(slopes.rest.layout(), geometry.0.layout()) {
+            geometry.0 = slopes.rest.clone();
+        }
+        *slopes = PosedSlopes::at_rest(geometry.0.clone());
     }
 }
 

@@ -20,14 +20,14 @@ use crate::weather::DryingClock;
 #[derive(Component, Clone)]
 pub struct WetGeometry(pub Arc<TexelGeometry>);
 
-/// How many surfaces are being measured, or may have to be.
+/// How many surfaces are being measured.
 #[derive(Resource, Debug, Default)]
 pub struct MeasureProgress {
     surfaces: usize,
 }
 
 impl MeasureProgress {
-    /// Whether any surface is being measured, or may have changed while it was.
+    /// Whether any surface is being measured.
     pub fn is_busy(&self) -> bool {
         self.surfaces > 0
     }
@@ -43,8 +43,6 @@ pub(super) struct Measured {
     matrix: Mat3A,
     /// It is another mesh, or another map, than before.
     reshaped: bool,
-    /// A change may have come while it was being measured.
-    late: bool,
     task: Option<Task<TexelGeometry>>,
     /// The tick in which `task` was begun.
     asked_at: u32,
@@ -103,75 +101,63 @@ pub(super) fn measure_surfaces(
         let changed =
             surface.is_changed() || map.is_changed() || collider.is_changed() || transform.is_changed();
         let (size, wrap) = (map.texels(), surface.wrap());
-        // What is being measured is finished first: a surface that keeps turning is measured as fast as that goes.
-        let stale = match &measured {
+        let is_of = |old: &Measured| old.is_of((size, wrap), &collider, &transform, is_posed);
+        let stale = match &mut measured {
             None => true,
-            Some(measured) if measured.task.is_some() => false,
-            Some(measured) => {
-                let changed = changed || measured.late;
-                changed && !measured.is_of((size, wrap), &collider, &transform, is_posed)
+            Some(old) if old.task.is_none() => changed && !is_of(old),
+            // What is being measured is finished first: a surface that keeps turning is measured as fast as that goes.
+            Some(old) => {
+                let asked_at = old.asked_at;
+                let Some(geometry) = timing.take(&mut old.task, asked_at, clock.tick()) else {
+                    progress.surfaces += 1;
+                    continue;
+                };
+                if (old.size, old.wrap) == (size, wrap) && Arc::ptr_eq(&old.bvh, &collider.0) {
+                    if let (Some(water), (Some(former), exposure, material)) = (&mut water, past)
+                        && water.is_wet()
+                    {
+                        // What has dried until now has dried by the old one.
+                        let material = material.copied().unwrap_or_default();
+                        let now = Now::new(clock.tick(), clock.hz(), &drying, &former.0, exposure, &material);
+                        water.settle_all(&now);
+                    }
+                    if let Some(water) = &mut water {
+                        choose_units(water, geometry.mean_mm2());
+                    }
+                    let mut entity = commands.entity(entity);
+                    entity.insert(WetGeometry(Arc::new(geometry)));
+                    if old.reshaped {
+                        entity.remove::<Exposure>();
+                    }
+                    if water.is_none() {
+                        entity.insert(SurfaceWater::of_size(size, wrap, texel.mean_mm2));
+                    }
+                }
+                // It may have changed in the meantime.
+                !is_of(old)
             }
         };
-        if stale {
-            if let Some(water) = &mut water
-                && (water.size, water.wrap) != (size, wrap)
-            {
-                // What was on the old maps is gone with them.
-                **water = SurfaceWater::of_size(size, wrap, texel.mean_mm2);
-                commands.entity(entity).remove::<(WetGeometry, Exposure)>();
-            }
-            let (affine, bvh) = (transform.affine(), collider.0.clone());
-            let triangles = bvh.clone();
-            let task = AsyncComputeTaskPool::get().spawn(async move {
-                TexelGeometry::new(triangles.triangles(), &affine, Vec3::Y, size, wrap)
-            });
-            let matrix = affine.matrix3;
-            let reshaped = measured
-                .as_ref()
-                .is_none_or(|old| (old.size, old.wrap) != (size, wrap) || !Arc::ptr_eq(&old.bvh, &bvh));
-            let (task, asked_at) = (Some(task), clock.tick());
-            let measured = Measured { size, wrap, bvh, matrix, reshaped, late: false, task, asked_at };
-            commands.entity(entity).insert(measured);
-            progress.surfaces += 1;
+        if !stale {
             continue;
         }
-        let Some(measured) = &mut measured else { continue };
-        if measured.task.is_none() {
-            if measured.late {
-                measured.late = false;
-            }
-            continue;
-        }
-        // Until it is taken, and for one look more.
-        progress.surfaces += 1;
-        // Nothing has run on what is new, has become another surface, or waits for the first tick.
-        let is_new = measured.reshaped || clock.tick() == 0;
-        let timing = if is_new { MeasureTiming::WhenReady } else { *timing };
-        let asked_at = measured.asked_at;
-        let Some(geometry) = timing.take(&mut measured.task, asked_at, clock.tick()) else { continue };
-        // It may have changed in the meantime.
-        measured.late = true;
-        if geometry.size() != size || measured.wrap != wrap || !Arc::ptr_eq(&measured.bvh, &collider.0) {
-            continue;
-        }
-        if let (Some(water), (Some(old), exposure, material)) = (&mut water, past)
-            && water.is_wet()
+        if let Some(water) = &mut water
+            && (water.size, water.wrap) != (size, wrap)
         {
-            // What has dried until now has dried by the old one.
-            let material = material.copied().unwrap_or_default();
-            water.settle_all(&Now::new(clock.tick(), clock.hz(), &drying, &old.0, exposure, &material));
+            // What was on the old maps is gone with them.
+            **water = SurfaceWater::of_size(size, wrap, texel.mean_mm2);
+            commands.entity(entity).remove::<(WetGeometry, Exposure)>();
         }
-        if let Some(water) = &mut water {
-            choose_units(water, geometry.mean_mm2());
-        }
-        let mut entity = commands.entity(entity);
-        entity.insert(WetGeometry(Arc::new(geometry)));
-        if measured.reshaped {
-            entity.remove::<Exposure>();
-        }
-        if water.is_none() {
-            entity.insert(SurfaceWater::of_size(size, wrap, texel.mean_mm2));
-        }
+        let (affine, bvh) = (transform.affine(), collider.0.clone());
+        let triangles = bvh.clone();
+        let task = AsyncComputeTaskPool::get()
+            .spawn(async move { TexelGeometry::new(triangles.triangles(), &affine, Vec3::Y, size, wrap) });
+        let matrix = affine.matrix3;
+        let reshaped = measured
+            .as_ref()
+            .is_none_or(|old| (old.size, old.wrap) != (size, wrap) || !Arc::ptr_eq(&old.bvh, &bvh));
+        let (task, asked_at) = (Some(task), clock.tick());
+        commands.entity(entity).insert(Measured { size, wrap, bvh, matrix, reshaped, task, asked_at });
+        progress.surfaces += 1;
     }
 }
 
@@ -266,7 +252,9 @@ pub(crate) fn put_matter(world: &mut World, surface: Entity, material: PorousMat
 
 /// A surface without maps has no water any more. What is queued for it, and what is falling off it, stays.
 pub(super) fn release_maps(removed: On<Remove, MapSize>, mut commands: Commands) {
-    commands.entity(removed.entity).try_remove::<(WetGeometry, Measured, SurfaceWater, Exposure)>();
+    commands
+        .entity(removed.entity)
+        .try_remove::<(WetGeometry, Measured, PosedSlopes, SurfaceWater, Exposure)>();
 }
 
 /// A surface that is not [`Weatherable`] any more is not wet any more.

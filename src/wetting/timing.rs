@@ -1,11 +1,14 @@
 //! When what is measured in the background takes effect.
 
+use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 use bevy::tasks::{Task, block_on, futures::check_ready};
 
-/// When surfaces that turn, change their size or take another pose run by what was measured anew, and when they dry by a sun that has
-/// moved. Until then it is the old slopes and shadows that count. What is measured for the first time is always taken when it is
-/// ready: nothing has run by then.
+use crate::clock::WeatheringClock;
+
+/// When meshes that are loaded or change are hit as they are, when surfaces that are new, turn, change their size or take another pose
+/// run by what was measured of them, and when they dry by a sun that has moved. Until then it is the old shape, slopes and shadows
+/// that count, and of what is new, none.
 #[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[reflect(Resource)]
 pub enum MeasureTiming {
@@ -13,7 +16,7 @@ pub enum MeasureTiming {
     #[default]
     WhenReady,
     /// So many ticks after it was asked for, at the start of a frame, which waits for it if need be: the same in every run that has the
-    /// same frames. Replays have this.
+    /// same frames. What is asked for before the first tick counts from the next frame on. Replays have this.
     AfterTicks(u32),
 }
 
@@ -29,11 +32,30 @@ impl MeasureTiming {
         let found = match self {
             Self::WhenReady => check_ready(under_way)?,
             // A clock that was set back has nothing to wait for.
-            Self::AfterTicks(ticks) if now.wrapping_sub(asked_at) < ticks => return None,
+            Self::AfterTicks(ticks) if asked_at > 0 && now.wrapping_sub(asked_at) < ticks => return None,
             Self::AfterTicks(_) => block_on(under_way),
         };
         *task = None;
         Some(found)
+    }
+}
+
+/// [`MeasureTiming`] and the time, for systems that may run without either.
+#[derive(SystemParam)]
+pub(crate) struct MeasureTimer<'w> {
+    timing: Option<Res<'w, MeasureTiming>>,
+    clock: Option<Res<'w, WeatheringClock>>,
+}
+
+impl MeasureTimer<'_> {
+    /// The present tick: that in which a task is begun.
+    pub(crate) fn tick(&self) -> u32 {
+        self.clock.as_deref().map_or(0, WeatheringClock::tick)
+    }
+
+    /// As [`MeasureTiming::take`].
+    pub(crate) fn take<T: Send + 'static>(&self, task: &mut Option<Task<T>>, asked_at: u32) -> Option<T> {
+        self.timing.as_deref().copied().unwrap_or_default().take(task, asked_at, self.tick())
     }
 }
 
@@ -80,6 +102,13 @@ mod tests {
         let mut task = slow(done);
         drop(finish);
         assert_eq!(timing.take(&mut task, 100, 3), Some(7));
+        // It was asked for before the first tick, which has come meanwhile, or not.
+        for now in [0, 1] {
+            let (finish, done) = channel();
+            let mut task = slow(done);
+            drop(finish);
+            assert_eq!(timing.take(&mut task, 0, now), Some(7));
+        }
     }
 
     #[test]

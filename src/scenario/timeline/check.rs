@@ -31,21 +31,35 @@ impl LoadedScenario {
                 return Err(self.value(format!("{field}.what.Capture"), name, "unique"));
             }
         }
+        let named = in_order(scenario).into_iter().map(|(index, event)| (format!("events[{index}]"), event));
+        self.validate_adjustments(named)?;
         self.validate_weather_changes()
     }
 
-    /// Checks an event by itself; what of the weather depends on the changes before it is not looked at.
+    /// Checks an event that is to be added; what of the weather depends on the changes before it is not looked at.
     ///
     /// # Errors
     /// [`ScenarioError`].
-    pub(crate) fn validate_event(&self, field: &str, event: &EventSpec) -> Result<(), ScenarioError> {
+    pub(crate) fn validate_new_event(&self, field: &str, event: &EventSpec) -> Result<(), ScenarioError> {
+        self.validate_event(field, event)?;
+        let Action::Adjust(new) = &event.what else { return Ok(()) };
+        let is_before = |other: &EventSpec| {
+            other.at <= event.at && matches!(&other.what, Action::Adjust(old) if old.emitter == new.emitter)
+        };
+        let before = in_order(&self.scenario).into_iter().filter(|&(_, other)| is_before(other));
+        let named = before.map(|(index, other)| (format!("events[{index}]"), other));
+        self.validate_adjustments(named.chain([(field.to_owned(), event)]))
+    }
+
+    /// Checks an event by itself; what depends on those before it is not looked at.
+    fn validate_event(&self, field: &str, event: &EventSpec) -> Result<(), ScenarioError> {
         self.range(&format!("{field}.at"), event.at, 0.0, f64::from(self.scenario.seconds))?;
         let field = format!("{field}.what.{}", event.what.kind());
         match &event.what {
             Action::Start(name) | Action::Stop(name) => self.validate_switch(&field, name),
             Action::Move(step) => self.validate_move(&field, step),
             Action::Adjust(adjustment) => self.validate_adjustment(&field, adjustment),
-            // In order of time, below.
+            // One after the other, together.
             Action::Weather(_) => Ok(()),
             Action::Camera(step) => self.look(&field, "eye", step.eye, step.target),
             Action::Brush(brush) => self.validate_brush(&field, brush),
@@ -102,13 +116,29 @@ impl LoadedScenario {
     }
 
     fn validate_adjustment(&self, field: &str, adjustment: &EmitterAdjustment) -> Result<(), ScenarioError> {
-        let index = self.one_emitter(&format!("{field}.emitter"), &adjustment.emitter)?;
+        self.one_emitter(&format!("{field}.emitter"), &adjustment.emitter)?;
         if adjustment.is_empty() {
             return Err(self.value(format!("{field}.rate"), "not given", "given, or another number"));
         }
-        let mut emitter = self.scenario.emitters[index].clone();
-        adjustment.make(&mut emitter);
-        self.validate_emitter(field, &emitter)
+        Ok(())
+    }
+
+    /// One after the other, in order of time, with their fields: what an emitter may become depends on what it is by then.
+    fn validate_adjustments<'a>(
+        &self,
+        events: impl Iterator<Item = (String, &'a EventSpec)>,
+    ) -> Result<(), ScenarioError> {
+        let mut emitters = self.scenario.emitters.clone();
+        for (field, event) in events {
+            let Action::Adjust(adjustment) = &event.what else { continue };
+            // That it is there has been checked.
+            let Some(emitter) = emitters.iter_mut().find(|emitter| emitter.name == adjustment.emitter) else {
+                continue;
+            };
+            adjustment.make(emitter);
+            self.validate_emitter(&format!("{field}.what.Adjust"), emitter)?;
+        }
+        Ok(())
     }
 
     fn validate_brush(&self, field: &str, event: &BrushEvent) -> Result<(), ScenarioError> {
@@ -236,6 +266,8 @@ mod tests {
             (at: 3.0, what: Material(surface: "a", model: Twomey())),
             (at: 3.0, what: Material(surface: "a", porous: (capacity_mm: 0.3), water: (rain_mm_per_h: 2.0))),
             (at: 3.0, what: Adjust(emitter: "hose", rate: 20.0, spread_deg: 4.0)),
+            (at: 6.0, what: Adjust(emitter: "hose", flow: MmPerHour(2.0))),
+            (at: 5.0, what: Adjust(emitter: "hose", shape: Sky(half_size: (1.0, 1.0)))),
             (at: 5.0, what: Capture("five")),
             (at: 5.0, what: Expect(quantity: WetFraction, surface: "a", above: 0.0, below: 0.5)),
             (at: 5.0, what: Expect(quantity: Particles, below: 100.0)),
@@ -290,6 +322,12 @@ mod tests {
             (r#"(at: 1.0, what: Adjust(emitter: "rain", rate: -1.0))"#, "events[0].what.Adjust.rate"),
             (
                 r#"(at: 1.0, what: Adjust(emitter: "rain", flow: MmPerHour(2.0)))"#,
+                "events[0].what.Adjust.flow",
+            ),
+            // By itself each makes sense; the second comes first.
+            (
+                r#"(at: 2.0, what: Adjust(emitter: "rain", shape: Point)),
+                   (at: 1.0, what: Adjust(emitter: "rain", shape: Sky(half_size: (1.0, 1.0)), flow: MmPerHour(2.0)))"#,
                 "events[0].what.Adjust.flow",
             ),
             (r#"(at: 1.0, what: Capture("../a"))"#, "events[0].what.Capture"),
