@@ -334,6 +334,11 @@ fn what_cannot_be_recorded_is_refused_or_told() {
     outcome.assert_success();
     assert!(outcome.stderr.contains("an emitter that is not the scenario's"), "{}", outcome.stderr);
     assert!(fs::read_to_string(&file).unwrap().contains("flaws: ["));
+    // Whoever goes back takes it along.
+    session.go_to(0.5);
+    session.run(1);
+    let flaws: Vec<_> = session.world().resource::<Recording>().flaws().collect();
+    assert_eq!(flaws, [(0.5, "an emitter that is not the scenario's was on")]);
 }
 
 #[test]

@@ -164,13 +164,15 @@ impl Recording {
         self.phase != Phase::Loading && self.watched.uses(effect)
     }
 
-    /// Each is told once.
+    /// Each is told once, and is as old as the earliest tick in which it was found, also by somebody who has gone back.
     pub(super) fn add_flaw(&mut self, flaw: &'static str) {
-        if self.flaws.iter().all(|(_, other)| *other != flaw) {
-            let seconds = f64::from(self.tick) / f64::from(self.hz());
-            warn!("{flaw}: the recording does not replay as it was from {seconds:.1} s on");
-            self.flaws.push((self.tick, flaw));
+        if let Some((tick, _)) = self.flaws.iter_mut().find(|(_, other)| *other == flaw) {
+            *tick = self.tick.min(*tick);
+            return;
         }
+        let seconds = f64::from(self.tick) / f64::from(self.hz());
+        warn!("{flaw}: the recording does not replay as it was from {seconds:.1} s on");
+        self.flaws.push((self.tick, flaw));
     }
 
     fn add_note(&mut self, note: impl Into<String>) {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use bevy::image::{ImageAddressMode, ImageSampler};
 use bevy::prelude::*;
 use bevy::render::render_resource::{TextureDimension, TextureFormat};
-use image::{DynamicImage, GrayImage, RgbImage, RgbaImage};
+use image::{DynamicImage, RgbImage, RgbaImage};
 use serde_json::{Value, json};
 
 use crate::export::ExportError;
@@ -82,7 +82,7 @@ fn picture(image: &Image, meaning: Meaning) -> Result<DynamicImage, String> {
         | TextureFormat::Rgba8UnormSrgb
         | TextureFormat::Bgra8Unorm
         | TextureFormat::Bgra8UnormSrgb => 4,
-        other => return Err(format!("is {other:?}; 8-bit RGBA and grey are written")),
+        other => return Err(format!("is {other:?}; 8-bit RGBA and red are written")),
     };
     let data = image.data.as_deref();
     let data = data.ok_or("is only on the GPU; keep it with `RenderAssetUsages::MAIN_WORLD`, too")?;
@@ -96,7 +96,9 @@ fn picture(image: &Image, meaning: Meaning) -> Result<DynamicImage, String> {
     let (width, height) = (size.width, size.height);
     let lost = "has not as many texels as it says";
     if channels == 1 {
-        return GrayImage::from_raw(width, height, texels).map(DynamicImage::from).ok_or(lost.into());
+        // A shader reads it as red alone; a grey picture would be all three.
+        let red = texels.iter().flat_map(|&red| [red, 0, 0]).collect();
+        return RgbImage::from_raw(width, height, red).map(DynamicImage::from).ok_or(lost.into());
     }
     if texels.chunks_exact(4).all(|texel| texel[3] == 255) {
         let opaque = texels.chunks_exact(4).flat_map(|texel| [texel[0], texel[1], texel[2]]).collect();
@@ -161,6 +163,9 @@ mod tests {
         assert_eq!(of(TextureFormat::Rgba8Unorm, Meaning::Color)[..4], [188, 0, 255, 255]);
         assert_eq!(of(TextureFormat::Bgra8UnormSrgb, Meaning::Color)[..4], [255, 0, 128, 255]);
         assert_eq!(of(TextureFormat::Rgba8Unorm, Meaning::FlippedNormals)[4..], [10, 236, 30, 40]);
+        // What has one channel has no green and no blue: a grey metallic-roughness map would be metal.
+        let red = picture(&image(TextureFormat::R8Unorm, vec![9, 200]), Meaning::Data).unwrap();
+        assert_eq!(red.to_rgb8().into_raw(), [9, 0, 0, 200, 0, 0]);
     }
 
     #[test]
