@@ -1,5 +1,5 @@
-//! Red paint that is thrown at a wall: an effect of your own, with its mark, colour, gloss and relief. Splats pile up, each
-//! turned and stretched by the way it came.
+//! Red paint that is thrown at a wall: an effect of your own, with its mark, colour, gloss and relief. Each
+//! splat is turned at random, and stretched by the way it came.
 //!
 //! `cargo run --release --example custom_effect`
 

@@ -20,7 +20,8 @@ use bevy_weathering::record::{
     put_back, save, take_back_stroke,
 };
 use bevy_weathering::scenario::{
-    ByHand, Digest, LoadedScenario, Scenario, ScenarioPlugin, ScenarioStatus, ScenarioSurface, amounts_digest,
+    Action, ByHand, CameraMove, Digest, LoadedScenario, Scenario, ScenarioPlugin, ScenarioStatus,
+    ScenarioSurface, amounts_digest,
 };
 use bevy_weathering::schedule::run_tick;
 use bevy_weathering::weather::Weather;
@@ -252,6 +253,21 @@ fn a_session_that_was_gone_back_in_goes_on_as_if_it_had_not_been() {
     let error = go_to(session.world(), 7.5).unwrap_err();
     assert!(matches!(error, RecordError::NotRecorded { .. }), "{error}");
     assert!(go_to(session.world(), f64::NAN).is_err());
+}
+
+#[test]
+fn what_waits_when_somebody_goes_back_is_no_branch() {
+    let mut session = Session::new();
+    session.play();
+    let digest = session.digest();
+    // In a pause the camera is moved and the floor painted; no tick has seen it yet.
+    let view = Action::Camera(CameraMove { eye: Vec3::X, target: Vec3::ZERO });
+    session.world().resource_mut::<Recording>().add(view);
+    session.paint(BrushKind::Wet, 1.0, 0.5);
+    session.go_to(3.0);
+    session.run(80);
+    assert_eq!(session.digest(), digest);
+    assert_eq!(session.world().resource::<Recording>().seconds(), 7.0);
 }
 
 #[test]

@@ -187,6 +187,13 @@ impl Recording {
         complaints.flaws.into_iter().for_each(|flaw| self.add_flaw(flaw));
     }
 
+    /// What waits for the next tick does not happen: in another second it would be a branch that nobody wanted.
+    pub(super) fn forget_wishes(&mut self, world: &mut World) {
+        self.others.clear();
+        self.watched.forget_wishes();
+        take_strokes(world);
+    }
+
     /// Takes back what was changed since events last acted, for the next tick.
     fn take_back(&mut self, world: &mut World) {
         if self.phase == Phase::Loading && matches!(world.resource::<ScenarioStatus>(), ScenarioStatus::Ready)
@@ -258,7 +265,9 @@ impl Recording {
                 self.add_note(error.to_string());
                 continue;
             }
-            if self.base.len() + self.actions.len() >= Self::MAX_EVENTS {
+            // What a branch leaves behind makes room.
+            let kept = if is_past { self.done_before(tick) } else { self.actions.len() };
+            if self.base.len() + kept >= Self::MAX_EVENTS {
                 self.add_note(format!("no more is recorded: there are {} events", Self::MAX_EVENTS));
                 break;
             }
@@ -278,9 +287,14 @@ impl Recording {
         exchange_events(world, &self.loaded.scenario);
     }
 
+    /// Number of things that were done before a tick.
+    fn done_before(&self, tick: u32) -> usize {
+        self.actions.partition_point(|action| action.tick < tick)
+    }
+
     /// What was done in this tick or later is no more; it is written into a file of its own.
     fn branch(&mut self, world: &mut World, tick: u32) {
-        let kept = self.actions.partition_point(|action| action.tick < tick);
+        let kept = self.done_before(tick);
         if kept < self.actions.len() {
             let old = free_file(&self.loaded.file);
             let written = self.text_at(world, &old, self.end).and_then(|text| write(&old, text.as_bytes()));

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use bevy::image::{ImageAddressMode, ImageSampler};
+use bevy::image::{ImageAddressMode, ImageFilterMode, ImageSampler};
 use bevy::prelude::*;
 use bevy::render::render_resource::{TextureDimension, TextureFormat};
 use image::{DynamicImage, RgbImage, RgbaImage};
@@ -129,16 +129,23 @@ fn recode(texels: &mut [u8], channels: usize, is_srgb: bool, meaning: Meaning) {
 }
 
 fn sampler(sampler: &ImageSampler) -> Value {
-    let edges = match sampler {
-        ImageSampler::Default => [ImageAddressMode::ClampToEdge; 2],
-        ImageSampler::Descriptor(descriptor) => [descriptor.address_mode_u, descriptor.address_mode_v],
+    let linear = ImageFilterMode::Linear;
+    let (edges, [near, far]) = match sampler {
+        ImageSampler::Default => ([ImageAddressMode::ClampToEdge; 2], [linear; 2]),
+        ImageSampler::Descriptor(descriptor) => (
+            [descriptor.address_mode_u, descriptor.address_mode_v],
+            [descriptor.mag_filter, descriptor.min_filter],
+        ),
     };
     let [s, t] = edges.map(|edge| match edge {
         ImageAddressMode::Repeat => 10_497,
         ImageAddressMode::MirrorRepeat => 33_648,
         ImageAddressMode::ClampToEdge | ImageAddressMode::ClampToBorder => 33_071,
     });
-    json!({ "magFilter": 9729, "minFilter": 9987, "wrapS": s, "wrapT": t })
+    let near = if near == linear { 9729 } else { 9728 };
+    // Between mip maps in any case: a reader makes them.
+    let far = if far == linear { 9987 } else { 9986 };
+    json!({ "magFilter": near, "minFilter": far, "wrapS": s, "wrapT": t })
 }
 
 #[cfg(test)]
@@ -178,6 +185,15 @@ mod tests {
         assert!(picture(&mapped, Meaning::Color).unwrap_err().contains("MAIN_WORLD"));
         let float = image(TextureFormat::R32Float, vec![0; 8]);
         assert!(picture(&float, Meaning::Data).unwrap_err().contains("R32Float"));
+    }
+
+    #[test]
+    fn sharp_texels_stay_sharp() {
+        let soft = json!({ "magFilter": 9729, "minFilter": 9987, "wrapS": 33_071, "wrapT": 33_071 });
+        assert_eq!(sampler(&ImageSampler::Default), soft);
+        assert_eq!(sampler(&ImageSampler::linear()), soft);
+        let sharp = json!({ "magFilter": 9728, "minFilter": 9986, "wrapS": 33_071, "wrapT": 33_071 });
+        assert_eq!(sampler(&ImageSampler::nearest()), sharp);
     }
 
     #[test]
