@@ -188,10 +188,10 @@ impl Recording {
     }
 
     /// What waits for the next tick does not happen: in another second it would be a branch that nobody wanted.
-    pub(super) fn forget_wishes(&mut self, world: &mut World) {
+    /// Strokes that wait go with the reset.
+    pub(super) fn forget_wishes(&mut self) {
         self.others.clear();
         self.watched.forget_wishes();
-        take_strokes(world);
     }
 
     /// Takes back what was changed since events last acted, for the next tick.
@@ -266,8 +266,8 @@ impl Recording {
                 continue;
             }
             // What a branch leaves behind makes room.
-            let kept = if is_past { self.done_before(tick) } else { self.actions.len() };
-            if self.base.len() + kept >= Self::MAX_EVENTS {
+            let left = self.actions.iter().rev().take_while(|action| is_past && action.tick >= tick).count();
+            if self.base.len() + self.actions.len() - left >= Self::MAX_EVENTS {
                 self.add_note(format!("no more is recorded: there are {} events", Self::MAX_EVENTS));
                 break;
             }
@@ -287,14 +287,9 @@ impl Recording {
         exchange_events(world, &self.loaded.scenario);
     }
 
-    /// Number of things that were done before a tick.
-    fn done_before(&self, tick: u32) -> usize {
-        self.actions.partition_point(|action| action.tick < tick)
-    }
-
     /// What was done in this tick or later is no more; it is written into a file of its own.
     fn branch(&mut self, world: &mut World, tick: u32) {
-        let kept = self.done_before(tick);
+        let kept = self.actions.partition_point(|action| action.tick < tick);
         if kept < self.actions.len() {
             let old = free_file(&self.loaded.file);
             let written = self.text_at(world, &old, self.end).and_then(|text| write(&old, text.as_bytes()));
