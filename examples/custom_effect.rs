@@ -1,4 +1,7 @@
-//! Paint that is thrown at a wall: an effect of your own, with its mark, colour, gloss and relief.
+//! Red paint that is thrown at a wall: an effect of your own, with its mark, colour, gloss and relief. Each
+//! splat is turned at random, and stretched by the way it came.
+//!
+//! `cargo run --release --example custom_effect`
 
 use bevy::prelude::*;
 use bevy_weathering::effect::{Paint, ParticleLook, Sprite, StampSource};

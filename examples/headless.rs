@@ -1,4 +1,7 @@
-//! No window and no graphics driver: two minutes of rain on a floor and a ball, as fast as the machine can, in numbers.
+//! No window and no graphics driver: two minutes of rain on a floor and a ball, as fast as the machine can. Every half a minute
+//! of weather it prints how much water is on and in them, and ends.
+//!
+//! `cargo run --release --example headless`
 
 use bevy::asset::AssetPlugin;
 use bevy::mesh::MeshPlugin;

@@ -1,4 +1,7 @@
-//! A garden hose: it points where the mouse does, and runs while the left button is held.
+//! A garden hose that points where the mouse does, and runs while the left button is held: water darkens a brick wall, runs
+//! down, and drips on the floor.
+//!
+//! `cargo run --release --example hose`
 
 use bevy::prelude::*;
 use bevy_weathering::prelude::*;

@@ -1,4 +1,6 @@
-//! The five lines that make a Bevy scene wet.
+//! The five lines that make a Bevy scene wet: a clay ball in a shower, which gets dark and shiny from above.
+//!
+//! `cargo run --release --example minimal`
 
 use bevy::prelude::*;
 use bevy_weathering::prelude::*;

@@ -1,4 +1,7 @@
-//! Five kinds of matter in one shower: terracotta, sandstone, asphalt, sand, and a glazed pot.
+//! Five balls in one shower, from the left: terracotta, sandstone, asphalt, sand, and a glazed one. Each takes up water, and
+//! looks with it, in its own way.
+//!
+//! `cargo run --release --example own_material`
 
 use bevy::prelude::*;
 use bevy_weathering::prelude::*;

@@ -1,4 +1,7 @@
-//! How wet is the floor? The title says it of its middle; the log says when all of it is wet, and dry again.
+//! How wet is the floor? The title of the window says it of its middle, at every moment; the log says when a fifth of it is
+//! wet, and when it is dry again. A shower comes every half a minute.
+//!
+//! `cargo run --release --example query_wetness`
 
 use bevy::prelude::*;
 use bevy_weathering::prelude::*;

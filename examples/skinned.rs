@@ -1,4 +1,6 @@
-//! A reed that sways in the rain: what is skinned gets wet where its pose is hit.
+//! A reed that sways in the rain: what is skinned gets wet where its pose is hit, and water runs down the pose.
+//!
+//! `cargo run --release --example skinned`
 
 use bevy::camera::visibility::NoFrustumCulling;
 use bevy::mesh::VertexAttributeValues;

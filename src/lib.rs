@@ -122,5 +122,6 @@ mod guide {
     #[doc = include_str!("../docs/effects.md")]
     #[doc = include_str!("../docs/materials.md")]
     #[doc = include_str!("../docs/performance.md")]
+    #[doc = include_str!("../docs/export.md")]
     struct Guide;
 }

@@ -20,7 +20,8 @@ use bevy_weathering::record::{
     put_back, save, take_back_stroke,
 };
 use bevy_weathering::scenario::{
-    ByHand, Digest, LoadedScenario, Scenario, ScenarioPlugin, ScenarioStatus, ScenarioSurface, amounts_digest,
+    Action, ByHand, CameraMove, Digest, LoadedScenario, Scenario, ScenarioPlugin, ScenarioStatus,
+    ScenarioSurface, amounts_digest,
 };
 use bevy_weathering::schedule::run_tick;
 use bevy_weathering::weather::Weather;
@@ -255,6 +256,21 @@ fn a_session_that_was_gone_back_in_goes_on_as_if_it_had_not_been() {
 }
 
 #[test]
+fn what_waits_when_somebody_goes_back_is_no_branch() {
+    let mut session = Session::new();
+    session.play();
+    let digest = session.digest();
+    // In a pause the camera is moved and the floor painted; no tick has seen it yet.
+    let view = Action::Camera(CameraMove { eye: Vec3::X, target: Vec3::ZERO });
+    session.world().resource_mut::<Recording>().add(view);
+    session.paint(BrushKind::Wet, 1.0, 0.5);
+    session.go_to(3.0);
+    session.run(80);
+    assert_eq!(session.digest(), digest);
+    assert_eq!(session.world().resource::<Recording>().seconds(), 7.0);
+}
+
+#[test]
 fn a_branch_is_another_session_and_the_old_one_is_kept() {
     let mut session = Session::new();
     session.play();
@@ -334,6 +350,11 @@ fn what_cannot_be_recorded_is_refused_or_told() {
     outcome.assert_success();
     assert!(outcome.stderr.contains("an emitter that is not the scenario's"), "{}", outcome.stderr);
     assert!(fs::read_to_string(&file).unwrap().contains("flaws: ["));
+    // Whoever goes back takes it along.
+    session.go_to(0.5);
+    session.run(1);
+    let flaws: Vec<_> = session.world().resource::<Recording>().flaws().collect();
+    assert_eq!(flaws, [(0.5, "an emitter that is not the scenario's was on")]);
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! The whole way: read, rain, bake, write.
 
 use std::collections::BTreeMap;
+use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -151,7 +153,8 @@ impl Export {
     }
 
     /// Writes `<stem>_weathered.glb`, `maps/<surface>_*.png` as a replay does, and, when all of them are there, `report.json`.
-    /// Each is written whole or not at all. The paths of scene and report.
+    /// Each is written whole or not at all; a report of before is removed first, so one that is there is about what lies beside
+    /// it. The paths of scene and report.
     ///
     /// # Errors
     /// [`ExportError::Write`], [`ExportError::Replay`] with the file.
@@ -161,6 +164,12 @@ impl Export {
             write_atomic(path, bytes).map_err(|source| ExportError::Write { path: path.into(), source })
         };
         let json = serde_json::to_vec_pretty(&self.report)?;
+        match fs::remove_file(&report) {
+            Err(source) if source.kind() != io::ErrorKind::NotFound => {
+                return Err(ExportError::Write { path: report, source });
+            }
+            _ => {}
+        }
         write_maps(&folder.join("maps"), &self.maps)?;
         write(&scene, &self.glb)?;
         write(&report, &json)?;

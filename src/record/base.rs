@@ -155,7 +155,13 @@ fn add_emitters(
         }
         let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
         let name: String = spec.name.chars().map(plain).collect();
-        spec.effect = format!("recorded_{name}.effect.ron");
+        // Names may differ by what is not plain alone.
+        let named = |number: u32| match number {
+            1 => format!("recorded_{name}.effect.ron"),
+            _ => format!("recorded_{name}_{number}.effect.ron"),
+        };
+        let free = (1..).map(named).find(|file| !folder.join(file).exists());
+        spec.effect = free.unwrap_or_else(|| named(1));
         write(&folder.join(&spec.effect), effect.as_bytes())?;
         (spec.start, spec.stop) = (0.0, None);
         if !is_on {
@@ -262,6 +268,23 @@ mod tests {
         assert!(prepare(&loaded, beginning.clone(), &folder).is_err());
         let again = prepare(&base, beginning, &to.path().join("again")).unwrap();
         assert_eq!(again.scenario.emitters.len(), 3);
+    }
+
+    #[test]
+    fn emitters_of_like_names_keep_effects_of_their_own() {
+        let (from, to) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let loaded = scene(from.path());
+        let ExtraEmitter { spec, .. } = hose();
+        let spec = EmitterSpec { name: "hose_in_the_hand".into(), ..spec };
+        let like = ExtraEmitter { spec, effect: "(volume_mm3: 5.0)".into(), is_on: true };
+        let beginning = Beginning { emitters: vec![hose(), like], ..default() };
+        let base = prepare(&loaded, beginning, &to.path().join("new")).unwrap();
+        let text = |name: &str| {
+            let spec = base.scenario.emitters.iter().find(|emitter| emitter.name == name).unwrap();
+            std::fs::read_to_string(base.tree.join(&spec.effect)).unwrap()
+        };
+        assert_eq!(text("hose in the hand"), "(volume_mm3: 3.0)");
+        assert_eq!(text("hose_in_the_hand"), "(volume_mm3: 5.0)");
     }
 
     #[test]

@@ -11,6 +11,25 @@
 //! surfaces and emitters that are no scenario's. Emission has full detail while a session is recorded, however slow the machine;
 //! time slows down instead.
 //!
+//! ```no_run
+//! # use bevy::prelude::*;
+//! # use bevy_weathering::record::{Beginning, RecordError, begin, prepare, save};
+//! # use bevy_weathering::scenario::{LoadedScenario, PreparedScenario, switch_scenario};
+//! # fn start(world: &mut World, open: &LoadedScenario) -> Result<(), RecordError> {
+//! // As it is set now, in a folder of its own, from which it is started over.
+//! let beginning = Beginning::of(world);
+//! let base = prepare(open, beginning, "recorded".as_ref())?;
+//! let prepared = PreparedScenario::new(base.clone(), true)?;
+//! switch_scenario(world, prepared);
+//! begin(world, base);
+//! # Ok(()) }
+//! # fn later(world: &mut World) -> Result<(), RecordError> {
+//! // When something has been done:
+//! let file = save(world)?;
+//! info!("weathering replay {}", file.display());
+//! # Ok(()) }
+//! ```
+//!
 //! # Going back
 //! Moments are kept as the session goes on (`history`), and any second can be gone back to ([`go_to`]): the moment before it is put
 //! back, and ticks run from there on by what was recorded. Then what was done after it happens again, until somebody does

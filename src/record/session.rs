@@ -164,13 +164,15 @@ impl Recording {
         self.phase != Phase::Loading && self.watched.uses(effect)
     }
 
-    /// Each is told once.
+    /// Each is told once, and is as old as the earliest tick in which it was found, also by somebody who has gone back.
     pub(super) fn add_flaw(&mut self, flaw: &'static str) {
-        if self.flaws.iter().all(|(_, other)| *other != flaw) {
-            let seconds = f64::from(self.tick) / f64::from(self.hz());
-            warn!("{flaw}: the recording does not replay as it was from {seconds:.1} s on");
-            self.flaws.push((self.tick, flaw));
+        if let Some((tick, _)) = self.flaws.iter_mut().find(|(_, other)| *other == flaw) {
+            *tick = self.tick.min(*tick);
+            return;
         }
+        let seconds = f64::from(self.tick) / f64::from(self.hz());
+        warn!("{flaw}: the recording does not replay as it was from {seconds:.1} s on");
+        self.flaws.push((self.tick, flaw));
     }
 
     fn add_note(&mut self, note: impl Into<String>) {
@@ -183,6 +185,13 @@ impl Recording {
     fn tell(&mut self, complaints: Complaints) {
         complaints.refused.into_iter().for_each(|note| self.add_note(note));
         complaints.flaws.into_iter().for_each(|flaw| self.add_flaw(flaw));
+    }
+
+    /// What waits for the next tick does not happen: in another second it would be a branch that nobody wanted.
+    /// Strokes that wait go with the reset.
+    pub(super) fn forget_wishes(&mut self) {
+        self.others.clear();
+        self.watched.forget_wishes();
     }
 
     /// Takes back what was changed since events last acted, for the next tick.
@@ -256,7 +265,9 @@ impl Recording {
                 self.add_note(error.to_string());
                 continue;
             }
-            if self.base.len() + self.actions.len() >= Self::MAX_EVENTS {
+            // What a branch leaves behind makes room.
+            let left = self.actions.iter().rev().take_while(|action| is_past && action.tick >= tick).count();
+            if self.base.len() + self.actions.len() - left >= Self::MAX_EVENTS {
                 self.add_note(format!("no more is recorded: there are {} events", Self::MAX_EVENTS));
                 break;
             }

@@ -85,6 +85,20 @@ fn a_baked_scene_keeps_the_rules_and_all_that_it_had() {
 }
 
 #[test]
+fn a_report_is_not_of_an_earlier_export() {
+    let export = baked(|_| {});
+    let folder = tempfile::tempdir().unwrap();
+    let [scene, report] = export.write(folder.path(), "scene").unwrap();
+    assert!(scene.is_file() && report.is_file());
+    // The next one fails at its first map.
+    let maps = folder.path().join("maps");
+    std::fs::remove_dir_all(&maps).unwrap();
+    std::fs::write(&maps, "in the way").unwrap();
+    assert!(export.write(folder.path(), "scene").is_err());
+    assert!(scene.is_file() && !report.exists());
+}
+
+#[test]
 fn instances_share_vertices_and_have_rain_of_their_own() {
     let export = baked(|_| {});
     let glb = Glb::parse(&export.glb);

@@ -72,6 +72,14 @@ fn exported(scene: &mut Scene) -> Export {
 }
 
 #[test]
+fn a_world_without_the_plugins_is_an_error() {
+    let mut world = World::new();
+    world.spawn((Weatherable::default(), Mesh3d::default(), GlobalTransform::default()));
+    let error = Snapshot::take(&mut world, "room", &SurfaceColors::default()).unwrap_err();
+    assert!(matches!(error, ExportError::NoSurface { .. }), "{error}");
+}
+
+#[test]
 fn what_an_app_shows_is_a_scene_with_its_water() {
     let mut scene = scene();
     let texture = add(&mut scene, bricks());

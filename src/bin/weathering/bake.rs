@@ -10,6 +10,7 @@ use bevy_weathering::weather::Weather;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::print;
 use crate::wetmap::numbers;
 
 #[derive(Args, Debug)]
@@ -87,7 +88,7 @@ pub fn run(arguments: &BakeArgs) -> Result<(), Box<dyn Error>> {
     bar.finish_and_clear();
     let stem = arguments.scene.file_stem().unwrap_or_default().to_string_lossy();
     for path in export.write(&arguments.out, &stem)? {
-        println!("{}", path.display());
+        print(path.display())?;
     }
     Ok(())
 }

@@ -112,7 +112,6 @@ impl Looks {
             Value::Null
         };
 
-        let unit = |value: f32| value.clamp(0.0, 1.0);
         let tint = of.base_color.to_linear();
         let tint = [tint.red, tint.green, tint.blue, tint.alpha].map(unit);
         let mut json = json!({
@@ -158,8 +157,8 @@ impl Looks {
     }
 
     fn glow(&mut self, material: &mut Value, LinearRgba { red, green, blue, .. }: LinearRgba) {
-        let strength = red.max(green).max(blue).max(1.0);
-        let factor = [red, green, blue].map(|part| (part / strength).clamp(0.0, 1.0));
+        let strength = red.max(green).max(blue).clamp(1.0, f32::MAX);
+        let factor = [red, green, blue].map(|part| unit(part / strength));
         material["emissiveFactor"] = json!(factor);
         if strength > 1.0 {
             let extension = json!({ "emissiveStrength": strength });
@@ -198,6 +197,11 @@ fn set(object: &mut Value, field: &str, value: Value) {
     if !value.is_null() {
         object[field] = value;
     }
+}
+
+/// A factor of the format; what is no number would be `null`, and is 0.
+fn unit(value: f32) -> f32 {
+    if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) }
 }
 
 /// The index of refraction with Bevy's reflectance: what mirrors at normal incidence is `0.16 reflectance²` there and
@@ -252,6 +256,26 @@ mod tests {
         let used: Vec<_> = extensions.into_iter().collect();
         assert_eq!(used, ["KHR_materials_emissive_strength", "KHR_materials_ior"]);
         assert!(look(default()).unwrap().0["extensions"].is_null());
+    }
+
+    #[test]
+    fn what_is_no_number_does_not_get_into_the_file() {
+        let (json, _) = look(StandardMaterial {
+            base_color: Color::linear_rgba(f32::NAN, 2.0, -1.0, 1.0),
+            perceptual_roughness: f32::NAN,
+            metallic: f32::NEG_INFINITY,
+            reflectance: f32::NAN,
+            emissive: LinearRgba::rgb(f32::INFINITY, f32::NAN, 1.0),
+            ..default()
+        })
+        .unwrap();
+        let pbr = &json["pbrMetallicRoughness"];
+        assert_eq!(pbr["baseColorFactor"], json!([0.0, 1.0, 0.0, 1.0]));
+        assert_eq!([&pbr["roughnessFactor"], &pbr["metallicFactor"]], [&json!(0.0), &json!(0.0)]);
+        assert!(json["emissiveFactor"].as_array().unwrap().iter().all(Value::is_number), "{json}");
+        let extensions = &json["extensions"];
+        assert!(extensions["KHR_materials_emissive_strength"]["emissiveStrength"].is_number(), "{json}");
+        assert!(extensions["KHR_materials_ior"].is_null(), "{json}");
     }
 
     #[test]

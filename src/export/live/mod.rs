@@ -43,7 +43,7 @@ pub use colors::{ColorReadback, SurfaceColors};
 /// # Limits
 /// Only surfaces come along, not what stands around them; lights and cameras neither. Of a `StandardMaterial`: colour,
 /// roughness, metallic, normals, occlusion, emission, reflectance, alpha, both sides, the transform of its uvs; other
-/// materials count as plain white. Textures must be 8-bit RGBA or grey, with their data in main memory. Played wet maps,
+/// materials count as plain white. Textures must be 8-bit RGBA or red alone, with their data in main memory. Played wet maps,
 /// floods, ripples and salts are not baked.
 #[derive(Debug, Clone)]
 pub struct Snapshot {

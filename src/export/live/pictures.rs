@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use bevy::image::{ImageAddressMode, ImageSampler};
+use bevy::image::{ImageAddressMode, ImageFilterMode, ImageSampler};
 use bevy::prelude::*;
 use bevy::render::render_resource::{TextureDimension, TextureFormat};
-use image::{DynamicImage, GrayImage, RgbImage, RgbaImage};
+use image::{DynamicImage, RgbImage, RgbaImage};
 use serde_json::{Value, json};
 
 use crate::export::ExportError;
@@ -82,7 +82,7 @@ fn picture(image: &Image, meaning: Meaning) -> Result<DynamicImage, String> {
         | TextureFormat::Rgba8UnormSrgb
         | TextureFormat::Bgra8Unorm
         | TextureFormat::Bgra8UnormSrgb => 4,
-        other => return Err(format!("is {other:?}; 8-bit RGBA and grey are written")),
+        other => return Err(format!("is {other:?}; 8-bit RGBA and red are written")),
     };
     let data = image.data.as_deref();
     let data = data.ok_or("is only on the GPU; keep it with `RenderAssetUsages::MAIN_WORLD`, too")?;
@@ -96,7 +96,9 @@ fn picture(image: &Image, meaning: Meaning) -> Result<DynamicImage, String> {
     let (width, height) = (size.width, size.height);
     let lost = "has not as many texels as it says";
     if channels == 1 {
-        return GrayImage::from_raw(width, height, texels).map(DynamicImage::from).ok_or(lost.into());
+        // A shader reads it as red alone; a grey picture would be all three.
+        let red = texels.iter().flat_map(|&red| [red, 0, 0]).collect();
+        return RgbImage::from_raw(width, height, red).map(DynamicImage::from).ok_or(lost.into());
     }
     if texels.chunks_exact(4).all(|texel| texel[3] == 255) {
         let opaque = texels.chunks_exact(4).flat_map(|texel| [texel[0], texel[1], texel[2]]).collect();
@@ -127,16 +129,23 @@ fn recode(texels: &mut [u8], channels: usize, is_srgb: bool, meaning: Meaning) {
 }
 
 fn sampler(sampler: &ImageSampler) -> Value {
-    let edges = match sampler {
-        ImageSampler::Default => [ImageAddressMode::ClampToEdge; 2],
-        ImageSampler::Descriptor(descriptor) => [descriptor.address_mode_u, descriptor.address_mode_v],
+    let linear = ImageFilterMode::Linear;
+    let (edges, [near, far]) = match sampler {
+        ImageSampler::Default => ([ImageAddressMode::ClampToEdge; 2], [linear; 2]),
+        ImageSampler::Descriptor(descriptor) => (
+            [descriptor.address_mode_u, descriptor.address_mode_v],
+            [descriptor.mag_filter, descriptor.min_filter],
+        ),
     };
     let [s, t] = edges.map(|edge| match edge {
         ImageAddressMode::Repeat => 10_497,
         ImageAddressMode::MirrorRepeat => 33_648,
         ImageAddressMode::ClampToEdge | ImageAddressMode::ClampToBorder => 33_071,
     });
-    json!({ "magFilter": 9729, "minFilter": 9987, "wrapS": s, "wrapT": t })
+    let near = if near == linear { 9729 } else { 9728 };
+    // Between mip maps in any case: a reader makes them.
+    let far = if far == linear { 9987 } else { 9986 };
+    json!({ "magFilter": near, "minFilter": far, "wrapS": s, "wrapT": t })
 }
 
 #[cfg(test)]
@@ -161,6 +170,9 @@ mod tests {
         assert_eq!(of(TextureFormat::Rgba8Unorm, Meaning::Color)[..4], [188, 0, 255, 255]);
         assert_eq!(of(TextureFormat::Bgra8UnormSrgb, Meaning::Color)[..4], [255, 0, 128, 255]);
         assert_eq!(of(TextureFormat::Rgba8Unorm, Meaning::FlippedNormals)[4..], [10, 236, 30, 40]);
+        // What has one channel has no green and no blue: a grey metallic-roughness map would be metal.
+        let red = picture(&image(TextureFormat::R8Unorm, vec![9, 200]), Meaning::Data).unwrap();
+        assert_eq!(red.to_rgb8().into_raw(), [9, 0, 0, 200, 0, 0]);
     }
 
     #[test]
@@ -173,6 +185,15 @@ mod tests {
         assert!(picture(&mapped, Meaning::Color).unwrap_err().contains("MAIN_WORLD"));
         let float = image(TextureFormat::R32Float, vec![0; 8]);
         assert!(picture(&float, Meaning::Data).unwrap_err().contains("R32Float"));
+    }
+
+    #[test]
+    fn sharp_texels_stay_sharp() {
+        let soft = json!({ "magFilter": 9729, "minFilter": 9987, "wrapS": 33_071, "wrapT": 33_071 });
+        assert_eq!(sampler(&ImageSampler::Default), soft);
+        assert_eq!(sampler(&ImageSampler::linear()), soft);
+        let sharp = json!({ "magFilter": 9728, "minFilter": 9986, "wrapS": 33_071, "wrapT": 33_071 });
+        assert_eq!(sampler(&ImageSampler::nearest()), sharp);
     }
 
     #[test]

@@ -60,8 +60,8 @@ impl Snapshot {
     /// Those of a scenario come in its order, before others. Surfaces without maps come along dry.
     ///
     /// # Errors
-    /// [`ExportError::NoSurface`] if there are none, [`ExportError::Surface`] for a mesh, [`ExportError::Look`] for a material
-    /// or a place that cannot be written, [`ExportError::TooMany`] texels of maps.
+    /// [`ExportError::NoSurface`] if there are none, or no plugins that wet them; [`ExportError::Surface`] for a mesh,
+    /// [`ExportError::Look`] for a material or a place that cannot be written, [`ExportError::TooMany`] texels of maps.
     pub fn take(world: &mut World, name: &str, colors: &SurfaceColors) -> Result<Self, ExportError> {
         let path = PathBuf::from(name);
         let mut surfaces = world.query::<Item>();
@@ -76,7 +76,7 @@ impl Snapshot {
         items.sort_by_key(|((entity, ..), (_, scenario, _), ..)| {
             (scenario.map_or(u32::MAX, |surface| surface.index), *entity)
         });
-        if items.is_empty() {
+        if items.is_empty() || !is_simulated(world) {
             return Err(ExportError::NoSurface { path });
         }
         let clock = *world.resource::<WeatheringClock>();
@@ -147,6 +147,13 @@ impl Snapshot {
         let matter = world.get_resource::<MatterLook>().copied().unwrap_or_default();
         Ok(Self { path, looks, meshes: meshes.all, surfaces: shown, matter, report })
     }
+}
+
+/// Whether there are the plugins that wet surfaces.
+fn is_simulated(world: &World) -> bool {
+    world.contains_resource::<WeatheringClock>()
+        && world.contains_resource::<DryingClock>()
+        && world.contains_resource::<ParticleCounts>()
 }
 
 fn texels(size: Option<&MapSize>) -> u64 {

@@ -80,7 +80,7 @@ pub fn run(arguments: &ReplayArgs) -> Result<(), Box<dyn Error>> {
     };
     let outcomes = batch.run(&jobs, at_a_time);
     batch.bar.finish_and_clear();
-    print!("{}", table::table(&jobs, &outcomes));
+    crate::print(table::table(&jobs, &outcomes).trim_end())?;
     let failed = outcomes.iter().filter(|outcome| matches!(outcome, Outcome::Failed(_))).count();
     if failed > 0 {
         return Err(format!("{failed} of {} scenarios failed", jobs.len()).into());
