@@ -147,10 +147,12 @@ impl Recording {
 
     /// Number of strokes that can be taken back.
     pub fn strokes(&self) -> usize {
-        let mut strokes: Vec<u32> = self.actions.iter().map(|action| action.stroke).collect();
-        strokes.sort_unstable();
-        strokes.dedup();
-        strokes.iter().filter(|&&stroke| stroke > 0).count()
+        // Later ones have higher numbers, so each is a run.
+        let mut last = 0;
+        let begins = |action: &&Recorded| {
+            action.stroke > 0 && std::mem::replace(&mut last, action.stroke) != action.stroke
+        };
+        self.actions.iter().filter(begins).count()
     }
 
     pub(super) fn hz(&self) -> u32 {
