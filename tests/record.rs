@@ -13,19 +13,17 @@ use bevy_weathering::brush::{Brush, BrushKind, BrushQueue, Stroke};
 use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::emitter::{EmissionDetail, Emitter};
 use bevy_weathering::material::PorousMaterial;
-use bevy_weathering::matter::SurfaceMatter;
 use bevy_weathering::overlay::{CpuOverlayPlugin, GpuOverlayPlugin};
 use bevy_weathering::record::{
     Beginning, RecordError, RecordPlugin, Recording, begin, colors_at_hand, go_to, keep_moment, prepare,
     put_back, save, take_back_stroke,
 };
 use bevy_weathering::scenario::{
-    Action, ByHand, CameraMove, Digest, LoadedScenario, Scenario, ScenarioPlugin, ScenarioStatus,
-    ScenarioSurface, amounts_digest,
+    Action, ByHand, CameraMove, LoadedScenario, Scenario, ScenarioPlugin, ScenarioStatus, ScenarioSurface,
+    scene_digest,
 };
 use bevy_weathering::schedule::run_tick;
 use bevy_weathering::weather::Weather;
-use bevy_weathering::wetting::SurfaceWater;
 use tempfile::TempDir;
 
 use super::replay::{replay, run};
@@ -161,7 +159,7 @@ impl Session {
     }
 
     fn digest(&mut self) -> String {
-        digest(self.world())
+        scene_digest(self.world())
     }
 
     fn save(&mut self) -> PathBuf {
@@ -196,14 +194,6 @@ fn wait(app: &mut App) {
         }
     }
     panic!("never ready");
-}
-
-fn digest(world: &mut World) -> String {
-    let impacts = *world.resource::<Digest>();
-    let mut surfaces = world.query::<(&ScenarioSurface, &SurfaceWater, &SurfaceMatter)>();
-    let mut order: Vec<_> = surfaces.iter(world).collect();
-    order.sort_by_key(|(surface, ..)| surface.index);
-    amounts_digest(&impacts, order.into_iter().map(|(_, water, matter)| (water, matter)))
 }
 
 /// What the program makes of a recording.

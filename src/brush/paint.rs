@@ -4,10 +4,10 @@ use bevy::ecs::system::SystemParam;
 use bevy::math::Affine3A;
 use bevy::prelude::*;
 
-use super::footprint::texels_under;
+use super::footprint::Touched;
 use super::{Brush, BrushKind, BrushQueue, Stroke};
 use crate::clock::WeatheringClock;
-use crate::collision::{MeshTriangles, SurfaceCollider};
+use crate::collision::{MeshBvh, SurfaceCollider};
 use crate::material::PorousMaterial;
 use crate::matter::snow::rain_on_snow;
 use crate::matter::{MatterKind, SurfaceMatter, put, wake};
@@ -32,14 +32,14 @@ pub struct BrushSurfaces<'w, 's> {
     drying: Res<'w, DryingClock>,
     weather: Res<'w, Weather>,
     surfaces: Query<'w, 's, Surface>,
-    texels: Local<'s, Vec<(u32, f32)>>,
+    touched: Local<'s, Touched>,
 }
 
 impl BrushSurfaces<'_, '_> {
     /// Paints a stroke at once; how many texels it touched. Surfaces that are not measured yet are left out.
     pub fn paint(&mut self, stroke: &Stroke) -> u32 {
-        let Self { clock, drying, weather, surfaces, texels } = self;
-        let mut touched = 0;
+        let Self { clock, drying, weather, surfaces, touched } = self;
+        let mut count = 0;
         // Surfaces share nothing: their order does not matter.
         for (entity, mut water, mut matter, geometry, collider, transform, exposure, material) in surfaces {
             if stroke.surface.is_some_and(|only| only != entity) || geometry.0.size() != water.size {
@@ -50,9 +50,9 @@ impl BrushSurfaces<'_, '_> {
             let now = Now::new(clock.tick(), clock.hz(), drying, &geometry.0, exposure, material);
             let (water, matter) = (&mut *water, &mut *matter);
             let canvas = Canvas { water, matter, now: &now, weather };
-            touched += canvas.paint(&stroke.brush, collider.0.triangles(), &transform.affine(), texels);
+            count += canvas.paint(&stroke.brush, &collider.0, &transform.affine(), touched);
         }
-        touched
+        count
     }
 }
 
@@ -65,16 +65,16 @@ pub(super) struct Canvas<'a> {
 }
 
 impl Canvas<'_> {
-    /// Touches what lies under the brush; how many texels that were. `texels` is memory to work in.
+    /// Touches what lies under the brush; how many texels that were. `touched` is memory to work in.
     pub(super) fn paint(
         mut self,
         brush: &Brush,
-        triangles: &MeshTriangles,
+        mesh: &MeshBvh,
         world_from_mesh: &Affine3A,
-        texels: &mut Vec<(u32, f32)>,
+        touched: &mut Touched,
     ) -> u32 {
-        texels_under(brush, self.now.geometry, triangles, world_from_mesh, self.water.wrap, texels);
-        for &(texel, part) in texels.iter() {
+        touched.find(brush, self.now.geometry, mesh, world_from_mesh, self.water.wrap);
+        for &(texel, part) in &touched.texels {
             let strength = f64::from(brush.strength) * f64::from(part);
             match brush.kind {
                 BrushKind::Wet => self.wet(texel, strength),
@@ -85,7 +85,7 @@ impl Canvas<'_> {
                 BrushKind::Clean => self.clean(texel, strength),
             }
         }
-        texels.len() as u32
+        touched.texels.len() as u32
     }
 
     fn wet(&mut self, texel: u32, mm: f64) {
@@ -144,13 +144,14 @@ mod tests {
     struct Floor {
         place: Place,
         ground: Ground,
+        mesh: MeshBvh,
     }
 
     impl Floor {
         fn new() -> Self {
             let mut place = Place::flat(64, 1.0 / 64.0);
             place.material = PorousMaterial { capacity_mm: 0.0, ..default() };
-            Self { ground: Ground::dry(&place), place }
+            Self { ground: Ground::dry(&place), mesh: MeshBvh::build(place.triangles.clone()), place }
         }
 
         fn paint(&mut self, kind: BrushKind, strength: f32) -> u32 {
@@ -158,7 +159,7 @@ mod tests {
             let now = self.place.now(7);
             let (water, matter) = (&mut self.ground.water, &mut self.ground.matter);
             let canvas = Canvas { water, matter, now: &now, weather: &self.place.weather };
-            canvas.paint(&brush, &self.place.triangles, &Affine3A::IDENTITY, &mut Vec::new())
+            canvas.paint(&brush, &self.mesh, &Affine3A::IDENTITY, &mut Touched::default())
         }
 
         fn film(&self) -> u64 {

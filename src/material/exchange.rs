@@ -196,7 +196,6 @@ mod tests {
     use bevy::light::NotShadowCaster;
 
     use super::*;
-    use crate::overlay::Wrap;
 
     /// A surface on which nothing has fallen yet, and what follows it.
     struct Stage {
@@ -208,19 +207,7 @@ mod tests {
     impl Stage {
         fn new(dry: StandardMaterial) -> Self {
             let mut world = World::new();
-            let maps = Overlays {
-                size: 64,
-                wrap: [Wrap::Repeat; 2],
-                diffuse: default(),
-                specular: default(),
-                normal: default(),
-                state: default(),
-                has_room: false,
-                matter: default(),
-                has_matter_room: false,
-                rings: default(),
-                has_colors: false,
-            };
+            let maps = Overlays::bare(64);
             let (buffer, clock, matter) =
                 (ClockBuffer(default()), WeatheringClock::new(60), MatterLook::default());
             let traces = SurfaceTraces::default();

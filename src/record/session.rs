@@ -13,15 +13,12 @@ use crate::brush::{BrushQueue, Stroke};
 use crate::clock::WeatheringClock;
 use crate::effect::WeatherEffect;
 use crate::emitter::EmissionDetail;
-use crate::matter::SurfaceMatter;
 use crate::save::SavedScene;
 use crate::scenario::{
-    Action, BrushEvent, Digest, EventSpec, LoadedScenario, Scenario, ScenarioStatus, ScenarioSurface,
-    WeatherChange, amounts_digest, beginning_of, check_weather, exchange_events, tick_from,
-    weather_is_changing,
+    Action, BrushEvent, EventSpec, LoadedScenario, Scenario, ScenarioStatus, ScenarioSurface, WeatherChange,
+    beginning_of, check_weather, exchange_events, scene_digest, tick_from, weather_is_changing,
 };
 use crate::weather::Weather;
-use crate::wetting::SurfaceWater;
 
 /// What a session is about to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -150,10 +147,12 @@ impl Recording {
 
     /// Number of strokes that can be taken back.
     pub fn strokes(&self) -> usize {
-        let mut strokes: Vec<u32> = self.actions.iter().map(|action| action.stroke).collect();
-        strokes.sort_unstable();
-        strokes.dedup();
-        strokes.iter().filter(|&&stroke| stroke > 0).count()
+        // Later ones have higher numbers, so each is a run.
+        let mut last = 0;
+        let begins = |action: &&Recorded| {
+            action.stroke > 0 && std::mem::replace(&mut last, action.stroke) != action.stroke
+        };
+        self.actions.iter().filter(begins).count()
     }
 
     pub(super) fn hz(&self) -> u32 {
@@ -316,7 +315,7 @@ impl Recording {
         scenario.flaws.extend(self.flaws().map(|(at, flaw)| format!("{at:.2} s: {flaw}")));
         let mut remark = String::new();
         if end == world.resource::<WeatheringClock>().tick() && self.is_live() {
-            remark = format!("Digest after {end} ticks: {}", digest(world));
+            remark = format!("Digest after {end} ticks: {}", scene_digest(world));
         }
         text_of(&scenario, file, &remark)
     }
@@ -332,15 +331,6 @@ fn free_file(file: &Path) -> PathBuf {
     let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let named = |number: u32| file.with_file_name(format!("{stem}_{number}.ron"));
     (1..).map(named).find(|path| !path.exists()).unwrap_or_else(|| named(0))
-}
-
-/// Hash over impacts, events and amounts of the scenario that runs.
-fn digest(world: &mut World) -> String {
-    let impacts = *world.resource::<Digest>();
-    let mut surfaces = world.query::<(&ScenarioSurface, &SurfaceWater, &SurfaceMatter)>();
-    let mut order: Vec<_> = surfaces.iter(world).collect();
-    order.sort_by_key(|(surface, ..)| surface.index);
-    amounts_digest(&impacts, order.into_iter().map(|(_, water, matter)| (water, matter)))
 }
 
 /// Begins to record: `base` is what [`prepare`](super::prepare) has made, and has just become the scenario of the world, which

@@ -39,6 +39,15 @@ pub fn amounts_digest<'a>(
     hasher.finalize().to_hex().to_string()
 }
 
+/// [`amounts_digest`] of the scenario that runs in a world. Without a [`Digest`] there it is as if nothing had been hit.
+pub fn scene_digest(world: &mut World) -> String {
+    let impacts = world.get_resource::<Digest>().copied().unwrap_or_default();
+    let mut surfaces = world.query::<(&ScenarioSurface, &SurfaceWater, &SurfaceMatter)>();
+    let mut order: Vec<_> = surfaces.iter(world).collect();
+    order.sort_by_key(|(surface, ..)| surface.index);
+    amounts_digest(&impacts, order.into_iter().map(|(_, water, matter)| (water, matter)))
+}
+
 /// Adds this tick's impacts, which come in the order of their particles.
 pub(super) fn digest_impacts(
     clock: Res<WeatheringClock>,

@@ -26,11 +26,13 @@ mod reset;
 mod schema;
 mod spawn;
 mod switch;
+#[cfg(test)]
+mod test_app;
 mod timeline;
 mod validate;
 
 pub use content::SurfaceMesh;
-pub use digest::{Digest, amounts_digest};
+pub use digest::{Digest, amounts_digest, scene_digest};
 pub use error::ScenarioError;
 pub use load::LoadedScenario;
 pub(crate) use load::ron_options;

@@ -80,14 +80,9 @@ pub fn reset_scenario(world: &mut World) {
 mod tests {
     use std::path::Path;
 
-    use bevy::asset::AssetPlugin;
-    use bevy::mesh::MeshPlugin;
-    use bevy::time::TimeUpdateStrategy;
-
+    use super::super::test_app::{app, run_ticks, wait};
     use super::*;
-    use crate::WeatheringPlugins;
-    use crate::overlay::{CpuOverlayPlugin, GpuOverlayPlugin};
-    use crate::scenario::{Scenario, ScenarioPlugin, ScenarioStatus, amounts_digest};
+    use crate::scenario::{Scenario, scene_digest};
 
     const TAP: &str = r#"(
         seconds: 3.0,
@@ -111,41 +106,22 @@ mod tests {
     )"#;
 
     /// The scenario, when it is ready.
-    fn app(folder: &Path) -> App {
+    fn tap(folder: &Path) -> App {
         let paint = "(stamp_radius: 0.05, diffuse: (color: (0.4, 0.3, 0.2), opacity: 0.8))";
         std::fs::write(folder.join("tap.effect.ron"), paint).unwrap();
         let file = folder.join("tap.ron");
         std::fs::write(&file, TAP).unwrap();
-        let scenario = ScenarioPlugin::new(Scenario::load(&file).unwrap(), false).unwrap();
-        let mut app = App::new();
-        app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default(), MeshPlugin))
-            .add_plugins(WeatheringPlugins.build().disable::<GpuOverlayPlugin>())
-            .add_plugins((CpuOverlayPlugin, scenario))
-            .insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
-        app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(std::time::Duration::from_secs(3600));
-        app.finish();
-        app.cleanup();
-        for _ in 0..10_000 {
-            app.update();
-            match app.world().resource::<ScenarioStatus>() {
-                ScenarioStatus::Ready => return app,
-                ScenarioStatus::Loading => std::thread::sleep(std::time::Duration::from_millis(1)),
-                ScenarioStatus::Failed(error) => panic!("{error}"),
-            }
-        }
-        panic!("never ready");
+        let mut app = app(Scenario::load(&file).unwrap());
+        wait(&mut app);
+        app
     }
 
     /// Two seconds, and what came of them.
     fn run(app: &mut App) -> (String, ParticleCounts, SurfaceTraces) {
-        app.insert_resource(TimeUpdateStrategy::FixedTimesteps(40));
-        app.update();
-        app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
+        run_ticks(app, 40);
         let traces = traces(app);
         let world = app.world_mut();
-        let mut waters = world.query::<(&SurfaceWater, &SurfaceMatter)>();
-        let digest = amounts_digest(world.resource::<Digest>(), waters.iter(world));
-        (digest, *world.resource::<ParticleCounts>(), traces)
+        (scene_digest(world), *world.resource::<ParticleCounts>(), traces)
     }
 
     fn traces(app: &mut App) -> SurfaceTraces {
@@ -157,7 +133,7 @@ mod tests {
     #[test]
     fn what_follows_is_what_followed_the_first_time() {
         let folder = tempfile::tempdir().unwrap();
-        let mut app = app(folder.path());
+        let mut app = tap(folder.path());
         let first = run(&mut app);
         assert!(
             first.1.hit > 20 && first.2 == SurfaceTraces { water: true, paint: true, matter: false },

@@ -63,21 +63,11 @@ pub fn switch_scenario(world: &mut World, prepared: PreparedScenario) {
 #[cfg(test)]
 mod tests {
     use std::path::Path;
-    use std::time::Duration;
 
-    use bevy::asset::AssetPlugin;
-    use bevy::mesh::MeshPlugin;
-    use bevy::time::TimeUpdateStrategy;
-
+    use super::super::test_app::{app, run_ticks, wait};
     use super::*;
-    use crate::WeatheringPlugins;
-    use crate::matter::SurfaceMatter;
-    use crate::overlay::{CpuOverlayPlugin, GpuOverlayPlugin};
     use crate::particle::ParticleCounts;
-    use crate::scenario::{
-        Digest, Scenario, ScenarioPlugin, ScenarioStatus, ScenarioSurface, amounts_digest,
-    };
-    use crate::wetting::SurfaceWater;
+    use crate::scenario::{Scenario, ScenarioSurface, scene_digest};
 
     /// A floor below a tap. `name`: of the floor.
     fn scenario(folder: &Path, name: &str, hz: u32) -> LoadedScenario {
@@ -99,34 +89,12 @@ mod tests {
         Scenario::load(&file).unwrap()
     }
 
-    fn app(loaded: LoadedScenario) -> App {
-        let mut app = App::new();
-        app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default(), MeshPlugin))
-            .add_plugins(WeatheringPlugins.build().disable::<GpuOverlayPlugin>())
-            .add_plugins((CpuOverlayPlugin, ScenarioPlugin::new(loaded, false).unwrap()))
-            .insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
-        app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::from_secs(3600));
-        app.finish();
-        app.cleanup();
-        app
-    }
-
-    /// Two seconds of it, and what came of them.
+    /// Seconds of it, and what came of them.
     fn run(app: &mut App, ticks: u32) -> (String, ParticleCounts, String) {
-        for _ in 0..10_000 {
-            app.update();
-            match app.world().resource::<ScenarioStatus>() {
-                ScenarioStatus::Ready => break,
-                ScenarioStatus::Loading => std::thread::sleep(Duration::from_millis(1)),
-                ScenarioStatus::Failed(error) => panic!("{error}"),
-            }
-        }
-        app.insert_resource(TimeUpdateStrategy::FixedTimesteps(ticks));
-        app.update();
-        app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
+        wait(app);
+        run_ticks(app, ticks);
         let world = app.world_mut();
-        let mut waters = world.query::<(&SurfaceWater, &SurfaceMatter)>();
-        let digest = amounts_digest(world.resource::<Digest>(), waters.iter(world));
+        let digest = scene_digest(world);
         let mut names = world.query::<&ScenarioSurface>();
         let name = names.single(world).unwrap().name.clone();
         (digest, *world.resource::<ParticleCounts>(), name)

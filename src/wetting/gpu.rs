@@ -82,13 +82,65 @@ impl UploadStats {
     }
 }
 
-/// Packed tiles of a surface.
-#[derive(Component, Default)]
+/// Packed tiles of a surface: never more than it has, however long they wait.
+#[derive(Component, Debug, Default, PartialEq)]
 pub(super) struct PackedTiles {
+    /// Ascending, each once.
     tiles: Vec<u32>,
     texels: Vec<GpuTexelWater>,
     /// Of the same texels; none while no matter has come.
     matter: Vec<GpuTexelMatter>,
+}
+
+impl PackedTiles {
+    fn clear(&mut self) {
+        self.tiles.clear();
+        self.texels.clear();
+        self.matter.clear();
+    }
+
+    /// Adds tiles that were packed later, for the same buffers: those that are here already are as they were then. Leaves `later`
+    /// empty.
+    fn take_over(&mut self, later: &mut Self) {
+        if later.tiles.is_empty() {
+            return;
+        }
+        if self.tiles.is_empty() {
+            // What was cleared keeps its memory for the next ones.
+            std::mem::swap(self, later);
+            return;
+        }
+        let earlier = std::mem::take(self);
+        let (mut old, mut new) = (0, 0);
+        loop {
+            let (waiting, coming) = (earlier.tiles.get(old), later.tiles.get(new));
+            let is_later = match (waiting, coming) {
+                (Some(waiting), Some(coming)) => coming <= waiting,
+                (None, Some(_)) => true,
+                (Some(_), None) => false,
+                (None, None) => break,
+            };
+            if is_later {
+                self.push(later, new);
+                old += usize::from(waiting == coming);
+                new += 1;
+            } else {
+                self.push(&earlier, old);
+                old += 1;
+            }
+        }
+        later.clear();
+    }
+
+    /// Adds one tile of others.
+    fn push(&mut self, other: &Self, slot: usize) {
+        let texels = slot * TILE_TEXELS..(slot + 1) * TILE_TEXELS;
+        self.tiles.push(other.tiles[slot]);
+        self.texels.extend_from_slice(&other.texels[texels.clone()]);
+        if !other.matter.is_empty() {
+            self.matter.extend_from_slice(&other.matter[texels]);
+        }
+    }
 }
 
 /// Nothing is sent for maps that are gone.
@@ -107,8 +159,9 @@ fn pack_tiles(
         ),
         Or<(Changed<SurfaceWater>, Changed<Overlays>)>,
     >,
+    mut fresh: Local<PackedTiles>,
 ) {
-    for ((entity, mut water, matter, geometry), (exposure, mut overlays, packed)) in &mut surfaces {
+    for ((entity, mut water, matter, geometry), (exposure, mut overlays, mut packed)) in &mut surfaces {
         if !water.is_wet() || overlays.size != water.size {
             continue;
         }
@@ -123,7 +176,10 @@ fn pack_tiles(
                 overlays.matter = room(water.texels.len() * size_of::<GpuTexelMatter>());
                 overlays.has_matter_room = true;
             }
-            // All that was sent before is gone with the old buffer.
+            // All that was sent before is gone with the old buffer, and what waits was meant for that.
+            if let Some(packed) = &mut packed {
+                packed.clear();
+            }
             for tile in 0..water.tiles.flags.len() as u32 {
                 if water.tiles.has(tile, Tiles::WET) {
                     water.tiles.touch(tile);
@@ -133,32 +189,31 @@ fn pack_tiles(
         if water.tiles.dirty.is_empty() {
             continue;
         }
-        let mut fresh = PackedTiles::default();
-        let is_new = packed.is_none();
-        let mut packed = packed;
-        let target = packed.as_deref_mut().unwrap_or(&mut fresh);
         let mut dirty = std::mem::take(&mut water.tiles.dirty);
         geometry.0.add_gutter_tiles(&mut dirty);
         dirty.sort_unstable();
         dirty.dedup();
         for &tile in &dirty {
             water.tiles.flags[tile as usize] &= !Tiles::DIRTY;
-            target.tiles.push(tile);
+            fresh.tiles.push(tile);
             let shown = |local| {
                 let texel = texel_in(water.size, tile, local);
                 geometry.0.gutter_source(texel).unwrap_or(texel)
             };
             let texels = (0..TILE_TEXELS).map(shown);
-            target.texels.extend(texels.clone().map(|texel| pack_texel(water, &geometry.0, exposure, texel)));
+            fresh.texels.extend(texels.clone().map(|texel| pack_texel(water, &geometry.0, exposure, texel)));
             if overlays.has_matter_room {
                 let units = water.units;
-                target.matter.extend(texels.map(|texel| pack_matter(matter, units, &geometry.0, texel)));
+                fresh.matter.extend(texels.map(|texel| pack_matter(matter, units, &geometry.0, texel)));
             }
         }
         dirty.clear();
         water.tiles.dirty = dirty;
-        if is_new {
-            commands.entity(entity).insert(fresh);
+        match &mut packed {
+            Some(packed) => packed.take_over(&mut fresh),
+            None => {
+                commands.entity(entity).insert(std::mem::take(&mut *fresh));
+            }
         }
     }
 }
@@ -223,9 +278,7 @@ fn extract_tiles(
             // Meant for maps that are gone.
             *waiting = Pending { buffer, matter_buffer, packed: PackedTiles::default() };
         }
-        waiting.packed.tiles.append(&mut packed.tiles);
-        waiting.packed.texels.append(&mut packed.texels);
-        waiting.packed.matter.append(&mut packed.matter);
+        waiting.packed.take_over(packed);
     }
     // Gone, or without maps.
     pending.surfaces.retain(|entity, _| main_world.get::<Overlays>(*entity).is_some());
@@ -265,8 +318,52 @@ fn write_tiles(
             first = end;
         }
         stats.0[0].fetch_add(packed.tiles.len() as u64, Ordering::Relaxed);
-        packed.tiles.clear();
-        packed.texels.clear();
-        packed.matter.clear();
+        packed.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Tiles whose texels say which they are, and when they were packed.
+    fn packed(tiles: &[u32], when: u32, has_matter: bool) -> PackedTiles {
+        let mut packed = PackedTiles { tiles: tiles.to_vec(), ..default() };
+        for &tile in tiles {
+            let water = GpuTexelWater { tick: when, marks: tile, ..default() };
+            packed.texels.extend([water; TILE_TEXELS]);
+            if has_matter {
+                packed.matter.extend([GpuTexelMatter { dust_mud: when, snow: tile }; TILE_TEXELS]);
+            }
+        }
+        packed
+    }
+
+    #[test]
+    fn tiles_that_wait_are_there_once_as_they_were_last() {
+        for has_matter in [false, true] {
+            let mut waiting = PackedTiles::default();
+            waiting.take_over(&mut packed(&[2, 5, 9], 1, has_matter));
+            let mut later = packed(&[0, 5, 6, 11], 2, has_matter);
+            waiting.take_over(&mut later);
+            assert_eq!(later, PackedTiles::default());
+            assert_eq!(waiting.tiles, [0, 2, 5, 6, 9, 11]);
+            for (slot, when) in [2, 1, 2, 2, 1, 2].into_iter().enumerate() {
+                let tile = packed(&[waiting.tiles[slot]], when, has_matter);
+                let texels = slot * TILE_TEXELS..(slot + 1) * TILE_TEXELS;
+                assert_eq!(waiting.texels[texels.clone()], tile.texels);
+                assert_eq!(waiting.matter.get(texels).unwrap_or_default(), tile.matter);
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_grows_while_nothing_is_drawn() {
+        let mut waiting = PackedTiles::default();
+        for frame in 0..50 {
+            waiting.take_over(&mut packed(&[0, 1, 2, 3 + frame % 2], frame, true));
+        }
+        assert_eq!(waiting.tiles, [0, 1, 2, 3, 4]);
+        assert_eq!((waiting.texels.len(), waiting.matter.len()), (5 * TILE_TEXELS, 5 * TILE_TEXELS));
     }
 }

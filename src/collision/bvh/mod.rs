@@ -7,6 +7,7 @@
 //! | `boxes` | [`BoxBvh`]: the boxes of all surfaces |
 //! | `overlaps` | nothing: [`BoxOverlaps`] tells which of many boxes overlap one |
 //! | `levels` | nothing: the boxes of a tree, to be looked at |
+//! | `within` | nothing: the triangles of a mesh that are in a box |
 //!
 //! obvhs has a glam of its own version; values cross over as arrays, so that no lock file can make them differ.
 
@@ -14,6 +15,7 @@ mod boxes;
 mod deforming;
 mod levels;
 mod overlaps;
+mod within;
 
 use bevy::prelude::*;
 use obvhs::BvhBuildParams;

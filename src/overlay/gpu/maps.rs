@@ -69,6 +69,24 @@ impl Overlays {
         }
     }
 
+    /// Maps that repeat, and are nowhere on a GPU.
+    #[cfg(test)]
+    pub(crate) fn bare(size: u32) -> Self {
+        Self {
+            size,
+            wrap: [Wrap::Repeat; 2],
+            diffuse: default(),
+            specular: default(),
+            normal: default(),
+            state: default(),
+            has_room: false,
+            matter: default(),
+            has_matter_room: false,
+            rings: default(),
+            has_colors: false,
+        }
+    }
+
     /// Makes room for what is painted.
     pub(crate) fn open_colors(&mut self, images: &mut Assets<Image>, buffers: &mut Assets<ShaderBuffer>) {
         [self.diffuse, self.specular, self.normal] = overlay_images(self.size, self.wrap, images);

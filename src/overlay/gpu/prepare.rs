@@ -358,19 +358,7 @@ mod tests {
     /// A main world with one surface, inside a render world, as `ExtractSchedule` sees them.
     fn worlds() -> (World, Entity) {
         let mut main = MainWorld::default();
-        let overlays = Overlays {
-            size: 512,
-            wrap: [Wrap::Repeat; 2],
-            diffuse: default(),
-            specular: default(),
-            normal: default(),
-            state: default(),
-            has_room: false,
-            matter: default(),
-            has_matter_room: false,
-            rings: default(),
-            has_colors: true,
-        };
+        let overlays = Overlays { has_colors: true, ..Overlays::bare(512) };
         let surface = main.spawn((overlays, SplatQueue::default())).id();
         let mut render = World::new();
         render.insert_resource(main);

@@ -12,10 +12,10 @@ use bevy_weathering::export::{ColorReadback, ExportError, Snapshot};
 use bevy_weathering::scenario::ScenarioStatus;
 
 use super::open::Opened;
-use super::saving;
 use super::shots::{OutFolder, free_name};
 use super::split::Split;
 use super::ui::{Note, keyboard_is_free};
+use super::{record, saving};
 
 /// Frames that time stands still before anything is read.
 const SETTLE: u32 = 4;
@@ -40,6 +40,38 @@ pub fn plugin(app: &mut App) {
 /// Whether the scene has to stay as it is.
 pub fn is_reading(world: &World) -> bool {
     matches!(world.resource::<Exporting>().0, Some(Step::Settling { .. } | Step::Reading { .. }))
+}
+
+/// Whether time stands still only until it is read.
+pub fn goes_on_later(world: &World) -> bool {
+    matches!(
+        world.resource::<Exporting>().0,
+        Some(Step::Settling { goes_on: true, .. } | Step::Reading { goes_on: true, .. })
+    )
+}
+
+/// If time stands still until it is read: whether it goes on then is the other way round from now on.
+pub fn toggle_later(world: &mut World) -> bool {
+    let mut exporting = world.resource_mut::<Exporting>();
+    let (Some(Step::Settling { goes_on, .. }) | Some(Step::Reading { goes_on, .. })) = &mut exporting.0
+    else {
+        return false;
+    };
+    *goes_on = !*goes_on;
+    true
+}
+
+/// Another scene takes the place of this one: what is not read of it yet never will be.
+pub fn give_up(world: &mut World) {
+    let mut exporting = world.resource_mut::<Exporting>();
+    let (Some(Step::Settling { goes_on, .. }) | Some(Step::Reading { goes_on, .. })) = exporting.0 else {
+        return;
+    };
+    exporting.0 = None;
+    if goes_on {
+        world.resource_mut::<Time<Virtual>>().unpause();
+    }
+    world.resource_mut::<Note>().complain("not exported: another scene was opened");
 }
 
 /// The button.
@@ -74,6 +106,9 @@ fn obstacle(world: &World) -> Option<&'static str> {
     if world.contains_resource::<Split>() {
         return Some("End the comparison first: the copy is no part of the scene.");
     }
+    if record::is_travelling(world) {
+        return Some("Wait until the second is reached.");
+    }
     saving::is_busy(world).then_some("Wait until the scene is saved.")
 }
 
@@ -100,12 +135,6 @@ fn begin(world: &mut World) {
 fn advance(world: &mut World) {
     let Some(step) = world.resource_mut::<Exporting>().0.take() else { return };
     let next = match step {
-        // Another scene has taken its place, which is paused for reasons of its own.
-        Step::Settling { .. } | Step::Reading { .. }
-            if !matches!(*world.resource::<ScenarioStatus>(), ScenarioStatus::Ready) =>
-        {
-            None
-        }
         Step::Settling { frames: 0, goes_on } => {
             Some(Step::Reading { colors: ColorReadback::begin(world), goes_on })
         }

@@ -7,7 +7,7 @@ use bevy::window::WindowCloseRequested;
 use bevy_weathering::replay::describe_render_error;
 
 use super::saving::Saving;
-use super::ui::{Help, Note, keyboard_is_free};
+use super::ui::{Help, Note, UiInput, keyboard_is_free};
 
 /// The program ends as soon as nothing is being saved.
 #[derive(Resource, Default)]
@@ -23,11 +23,12 @@ pub fn plugin(app: &mut App) {
 
 fn press(
     keys: Res<ButtonInput<KeyCode>>,
+    input: Res<UiInput>,
     mut help: ResMut<Help>,
     mut leaving: ResMut<Leaving>,
     mut exit: MessageWriter<AppExit>,
 ) {
-    if !keys.just_pressed(KeyCode::Escape) {
+    if !keys.just_pressed(KeyCode::Escape) || input.popup {
         return;
     }
     // What is in front goes first.

@@ -114,17 +114,14 @@ fn sample(
     }
     let Ok((water, geometry, matter)) = surfaces.get(surface) else { return };
     let of_matter = |uv: Vec2| {
-        let (matter, size) = (matter?, water.size());
-        let texel = texel_under(size, uv);
-        let held = matter.texels().get(texel as usize)?;
+        let texel = texel_at(water.size(), &geometry.0, uv)?;
+        let held = matter?.texels().get(texel as usize)?;
         let units = match channel {
             Channel::Dust => held.dust,
             Channel::Mud => held.mud,
             _ => held.snow,
         };
-        // A geometry of another size is on its way out.
-        let is_measured = geometry.0.size() == size;
-        is_measured.then(|| (f64::from(units) * geometry.0.unit_mm(water.units(), texel)) as f32)
+        Some((f64::from(units) * geometry.0.unit_mm(water.units(), texel)) as f32)
     };
     let middle = |index: usize| (index as f32 + 0.5) / SIDE as f32;
     let value = |index: usize| {
@@ -150,7 +147,7 @@ fn texel_under(size: u32, uv: Vec2) -> u32 {
     y * size + x
 }
 
-/// The texel in which the water of a place is; `None` while the map is measured anew.
+/// The texel in which the water and the matter of a place are; `None` while the map is measured anew.
 pub fn texel_at(size: u32, geometry: &TexelGeometry, uv: Vec2) -> Option<u32> {
     let under = texel_under(size, uv);
     (geometry.size() == size).then(|| geometry.stand_in(under).unwrap_or(under))

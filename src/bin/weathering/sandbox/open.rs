@@ -13,7 +13,7 @@ use bevy_weathering::scenario::{
 };
 
 use super::ui::Note;
-use super::{model, record, split};
+use super::{export, model, record, saving, split};
 
 /// What is open.
 #[derive(Resource)]
@@ -71,6 +71,8 @@ fn finish(world: &mut World) {
         Some(Ok(prepared)) => {
             let (loaded, is_model) = (prepared.scenario().clone(), model::is_model(&file));
             record::finish(world);
+            saving::give_up(world);
+            export::give_up(world);
             split::end(world);
             switch_scenario(world, prepared);
             model::light_shade(world, is_model);

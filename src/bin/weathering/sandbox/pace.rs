@@ -12,7 +12,7 @@ use bevy_weathering::scenario::{ScenarioStatus, reset_scenario};
 use bevy_weathering::schedule::WeatheringTick;
 
 use super::ui::{AddPanel, Note, Place, keyboard_is_free};
-use super::{record, theme};
+use super::{export, record, saving, theme};
 
 /// Slowest and fastest.
 const SPEEDS: (f64, f64) = (0.1, 100.0);
@@ -60,9 +60,21 @@ fn step(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
     }
 }
 
-/// Pauses, or goes on, once the scene is there.
+/// Whether no tick may run now but those of whoever holds time.
+fn is_held(world: &World) -> bool {
+    !matches!(*world.resource::<ScenarioStatus>(), ScenarioStatus::Ready)
+        || record::is_travelling(world)
+        || saving::is_taking(world)
+        || export::is_reading(world)
+}
+
+/// Pauses, or goes on, once the scene is there. Where time is held, it goes on, or does not, when that is over.
 fn toggle(world: &mut World) {
-    if !matches!(*world.resource::<ScenarioStatus>(), ScenarioStatus::Ready) || record::is_travelling(world) {
+    if record::toggle_later(world)
+        || saving::toggle_later(world)
+        || export::toggle_later(world)
+        || is_held(world)
+    {
         return;
     }
     let mut time = world.resource_mut::<Time<Virtual>>();
@@ -75,7 +87,7 @@ fn toggle(world: &mut World) {
 
 /// One tick, and no other after it.
 fn one_tick(world: &mut World) {
-    if matches!(*world.resource::<ScenarioStatus>(), ScenarioStatus::Ready) && !record::is_travelling(world) {
+    if !is_held(world) {
         world.resource_mut::<Time<Virtual>>().pause();
         world.run_schedule(WeatheringTick);
     }
@@ -85,6 +97,10 @@ fn one_tick(world: &mut World) {
 pub fn start_over(world: &mut World) {
     if world.contains_resource::<Recording>() {
         record::travel(world, 0.0);
+        return;
+    }
+    if saving::is_taking(world) || export::is_reading(world) {
+        world.resource_mut::<Note>().complain("wait until the scene is saved, or read for the export");
         return;
     }
     reset_scenario(world);
@@ -99,7 +115,9 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
         ui.label("loading");
         return;
     }
-    let is_paused = world.resource::<Time<Virtual>>().is_paused();
+    let goes_on_later =
+        record::goes_on_later(world) || saving::goes_on_later(world) || export::goes_on_later(world);
+    let is_paused = world.resource::<Time<Virtual>>().is_paused() && !goes_on_later;
     let (label, about) = if is_paused { ("Run", "Go on (Space)") } else { ("Pause", "Stand still (Space)") };
     if ui.button(label).on_hover_text(about).clicked() {
         toggle(world);

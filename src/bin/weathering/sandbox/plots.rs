@@ -226,9 +226,14 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     let height = ui.available_height();
     ui.columns(charts.len(), |columns| {
         for (column, ((chart, name), _)) in columns.iter_mut().zip(charts) {
+            // Small, and in the order of the lines: charts are narrow beside open panels.
+            let legend = Legend::default()
+                .text_style(egui::TextStyle::Small)
+                .background_alpha(0.6)
+                .follow_insertion_order(true);
             let plot = Plot::new(name)
                 .height(height)
-                .legend(Legend::default())
+                .legend(legend)
                 .include_y(0.0)
                 .allow_scroll(false)
                 .allow_drag(false)

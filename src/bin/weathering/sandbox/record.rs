@@ -12,9 +12,10 @@ use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use bevy_egui::egui;
 use bevy_weathering::clock::{ShownTime, WeatheringClock};
 use bevy_weathering::effect::EffectTable;
+use bevy_weathering::emitter::Emitter;
 use bevy_weathering::record::{self, Beginning, RecordError, Recording};
 use bevy_weathering::scenario::{
-    Action, CameraKey, CameraMove, LoadedScenario, PreparedScenario, ScenarioStatus, SceneEntity,
+    Action, CameraKey, CameraMove, LoadedScenario, PreparedScenario, Scenario, ScenarioStatus, SceneEntity,
     switch_scenario,
 };
 use bevy_weathering::schedule::run_tick;
@@ -27,7 +28,7 @@ use super::shots::{OutFolder, free_name};
 use super::split::Split;
 use super::ui::{AddPanel, Note, Place, keyboard_is_free};
 use super::weather::{self, OwnRain};
-use super::{model, saving, theme};
+use super::{export, model, saving, theme};
 
 /// Frames between starting over and putting a moment back, in which surfaces get their new, empty maps.
 const SETTLE: u32 = 4;
@@ -78,6 +79,26 @@ pub fn is_travelling(world: &World) -> bool {
     world.resource::<Travel>().is_under_way
 }
 
+/// Whether time stands still only until another second is reached.
+pub fn goes_on_later(world: &World) -> bool {
+    let travel = world.resource::<Travel>();
+    travel.is_under_way && travel.goes_on
+}
+
+/// On the way to another second: whether time goes on there is the other way round from now on.
+pub fn toggle_later(world: &mut World) -> bool {
+    let mut travel = world.resource_mut::<Travel>();
+    if travel.is_under_way {
+        travel.goes_on = !travel.goes_on;
+    }
+    travel.is_under_way
+}
+
+/// Whether a scene is on its way to the disk, and must not change.
+fn is_busy(world: &World) -> bool {
+    saving::is_busy(world) || export::is_reading(world)
+}
+
 fn stand_still(travel: Res<Travel>, mut time: ResMut<Time<Virtual>>) {
     if travel.is_under_way && !time.is_paused() {
         time.pause();
@@ -107,8 +128,11 @@ fn obstacle(world: &World) -> Option<&'static str> {
     if world.contains_resource::<Split>() {
         return Some("End the comparison first: the copy is no part of the scenario.");
     }
-    if !matches!(world.resource::<ScenarioStatus>(), ScenarioStatus::Ready) || saving::is_busy(world) {
+    if !matches!(world.resource::<ScenarioStatus>(), ScenarioStatus::Ready) {
         return Some("Wait until the scene is there.");
+    }
+    if is_busy(world) {
+        return Some("Wait until the scene is saved, or read for the export.");
     }
     None
 }
@@ -171,32 +195,46 @@ fn start(world: &mut World, base: LoadedScenario, prepared: PreparedScenario) {
     world.resource_mut::<Note>().tell(told);
 }
 
-/// Writes what is being recorded, if anything is, and ends.
+/// Writes what is being recorded, if anything is, and ends. What was about to begin does not.
 pub fn finish(world: &mut World) {
+    world.resource_mut::<Preparing>().0 = None;
     if !world.contains_resource::<Recording>() {
         return;
     }
     saving::give_up_moment(world);
-    write(world);
+    let file = write(world);
     record::end(world);
-    *world.resource_mut::<Travel>() = Travel::default();
-    // They stay, as emitters of the scenario like others.
+    // It is what runs, and what is saved from now on fits the file as it is now.
+    match file.map(|file| Scenario::load(&file)) {
+        Some(Ok(loaded)) => world.resource_mut::<Opened>().loaded = loaded,
+        Some(Err(error)) => world.resource_mut::<Note>().complain(error.to_string()),
+        None => {}
+    }
+    let travel = std::mem::take(&mut *world.resource_mut::<Travel>());
+    if travel.is_under_way && travel.goes_on {
+        world.resource_mut::<Time<Virtual>>().unpause();
+    }
+    // They stay, as emitters of the scenario like others. Nobody would close a hose that nobody holds.
+    let mut hoses = world.query_filtered::<&mut Emitter, (With<SceneEntity>, With<InHand>)>();
+    hoses.iter_mut(world).for_each(|mut hose| hose.enabled = false);
     let mut tools = world.query_filtered::<Entity, (With<SceneEntity>, Or<(With<InHand>, With<OwnRain>)>)>();
     for tool in tools.iter(world).collect::<Vec<_>>() {
         world.entity_mut(tool).remove::<(InHand, OwnRain)>();
     }
+    weather::let_go(world);
 }
 
-/// Writes what was recorded so far.
-fn write(world: &mut World) {
+/// Writes what was recorded so far; the file, unless it could not be written.
+fn write(world: &mut World) -> Option<PathBuf> {
     let flaws = world.resource::<Recording>().flaws().count();
     let written = record::save(world);
     let mut note = world.resource_mut::<Note>();
-    match written {
+    match &written {
         Ok(file) if flaws == 0 => note.tell(format!("recorded {}", file.display())),
         Ok(file) => note.complain(format!("recorded {}, but it will not replay as it was", file.display())),
         Err(error) => note.complain(error.to_string()),
     }
+    written.ok()
 }
 
 fn write_at_the_end(mut exits: MessageReader<AppExit>, mut commands: Commands) {
@@ -207,7 +245,7 @@ fn write_at_the_end(mut exits: MessageReader<AppExit>, mut commands: Commands) {
 
 /// Goes to a second that has been recorded.
 pub fn travel(world: &mut World, seconds: f64) {
-    let gone = if saving::is_busy(world) { Err(RecordError::Busy) } else { record::go_to(world, seconds) };
+    let gone = if is_busy(world) { Err(RecordError::Busy) } else { record::go_to(world, seconds) };
     match gone {
         Ok(()) => set_out(world),
         Err(error) => world.resource_mut::<Note>().complain(error.to_string()),
@@ -216,7 +254,7 @@ pub fn travel(world: &mut World, seconds: f64) {
 
 /// Runs the session again without the last stroke.
 pub fn take_back_stroke(world: &mut World) {
-    let taken = if saving::is_busy(world) { Err(RecordError::Busy) } else { record::take_back_stroke(world) };
+    let taken = if is_busy(world) { Err(RecordError::Busy) } else { record::take_back_stroke(world) };
     match taken {
         Ok(true) => set_out(world),
         Ok(false) => world.resource_mut::<Note>().tell("no stroke to take back"),
@@ -257,7 +295,7 @@ fn advance(world: &mut World) {
         catch_up(world);
     } else if world.resource::<Travel>().is_under_way {
         arrive(world);
-    } else if wants_moment {
+    } else if wants_moment && !export::is_reading(world) {
         keep_moment(world);
     } else {
         follow_view(world);

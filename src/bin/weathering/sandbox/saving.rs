@@ -97,7 +97,7 @@ fn named_folder(world: &World) -> String {
 /// As the button does, where there is one.
 fn save(world: &mut World) {
     let is_ready = matches!(*world.resource::<ScenarioStatus>(), ScenarioStatus::Ready);
-    if !is_ready || world.resource::<Saving>().0.is_some() {
+    if !is_ready || is_busy(world) {
         return;
     }
     match obstacle(world) {
@@ -114,8 +114,48 @@ pub fn is_busy(world: &World) -> bool {
     world.resource::<Saving>().0.is_some()
 }
 
+/// Whether the scene has to stay as it is, or is being put back: what is on its way to the disk already may be left behind.
+pub fn is_taking(world: &World) -> bool {
+    let step = &world.resource::<Saving>().0;
+    matches!(step, Some(Step::Settling { .. } | Step::Reading { .. } | Step::Clearing { .. }))
+}
+
+/// Whether time stands still only until a moment is kept.
+pub fn goes_on_later(world: &World) -> bool {
+    matches!(
+        world.resource::<Saving>().0,
+        Some(
+            Step::Settling { purpose: Purpose::Moment { goes_on: true }, .. }
+                | Step::Reading { purpose: Purpose::Moment { goes_on: true }, .. }
+        )
+    )
+}
+
+/// If time stands still for a moment that is kept: whether it goes on then is the other way round from now on.
+pub fn toggle_later(world: &mut World) -> bool {
+    let mut saving = world.resource_mut::<Saving>();
+    let (Some(Step::Settling { purpose, .. }) | Some(Step::Reading { purpose, .. })) = &mut saving.0 else {
+        return false;
+    };
+    let Purpose::Moment { goes_on } = purpose else { return false };
+    *goes_on = !*goes_on;
+    true
+}
+
+/// Another scene takes the place of this one: what is not taken of it yet never will be.
+pub fn give_up(world: &mut World) {
+    give_up_moment(world);
+    if is_taking(world) {
+        world.resource_mut::<Saving>().0 = None;
+        world.resource_mut::<Note>().complain("not saved, or gone on with: another scene was opened");
+    }
+}
+
 /// Why the scene cannot be saved as it is.
 fn obstacle(world: &mut World) -> Option<&'static str> {
+    if export::is_reading(world) {
+        return Some("Wait until the scene is read for the export.");
+    }
     let opened = world.resource::<Opened>();
     if opened.is_model {
         return Some("A model that was opened by itself has no scenario to be saved with.");
@@ -399,6 +439,40 @@ mod tests {
             }
             assert_eq!(app.should_exit(), Some(AppExit::Success));
         }
+    }
+
+    #[test]
+    fn escape_closes_a_list_that_is_in_front_before_it_leaves() {
+        let mut app = app();
+        app.insert_resource(UiInput { popup: true, ..default() });
+        app.world_mut().resource_mut::<ButtonInput<KeyCode>>().press(KeyCode::Escape);
+        app.update();
+        assert_eq!(app.should_exit(), None);
+        app.insert_resource(UiInput::default());
+        app.update();
+        assert_eq!(app.should_exit(), Some(AppExit::Success));
+    }
+
+    #[test]
+    fn a_pause_while_a_moment_is_kept_comes_after_it() {
+        let mut world = World::new();
+        let purpose = Purpose::Moment { goes_on: true };
+        world.insert_resource(Saving(Some(Step::Settling { purpose, frames: SETTLE })));
+        assert!(is_taking(&world) && goes_on_later(&world));
+        assert!(toggle_later(&mut world) && !goes_on_later(&world));
+        assert!(toggle_later(&mut world) && goes_on_later(&world));
+        // What is saved into a folder stays paused then.
+        world.insert_resource(settling());
+        assert!(is_taking(&world) && !toggle_later(&mut world) && !goes_on_later(&world));
+    }
+
+    #[test]
+    fn of_a_scene_that_another_has_replaced_nothing_is_saved() {
+        let mut world = World::new();
+        world.init_resource::<Note>();
+        world.insert_resource(settling());
+        give_up(&mut world);
+        assert!(!is_busy(&world));
     }
 
     #[test]

@@ -163,7 +163,10 @@ fn paint(
     let shade = settings.views.shade;
     let when = |cover: &Cover| cover.read.filter(|(of, _)| *of == shade).map(|(_, when)| when);
     let is_due = |cover: &Cover| when(cover).is_none_or(|when| when.elapsed().as_secs_f32() >= EVERY);
-    let due = covers.iter_mut().filter(|(cover, _)| is_due(cover)).min_by_key(|(cover, _)| when(cover));
+    // One that holds nothing yet would be the next for ever.
+    let can_be_read = |surface: &ChildOf| surfaces.contains(surface.parent());
+    let due = covers.iter_mut().filter(|(cover, surface)| is_due(cover) && can_be_read(surface));
+    let due = due.min_by_key(|(cover, _)| when(cover));
     let Some((mut cover, surface)) = due.filter(|_| shade != Shade::Off) else { return };
     let surface = surface.parent();
     let Ok((water, geometry)) = surfaces.get(surface) else { return };

@@ -57,6 +57,8 @@ pub struct UiInput {
     pub pointer: bool,
     /// A text is being edited.
     pub keyboard: bool,
+    /// A list or the like is open in front, which Escape closes.
+    pub popup: bool,
 }
 
 /// The help is open.
@@ -188,10 +190,9 @@ fn draw(world: &mut World, mut is_dressed: Local<bool>) {
     }
     let outside = context.pointer_latest_pos().is_some_and(|at| !free.contains(at));
     let mut input = world.resource_mut::<UiInput>();
-    input.pointer = outside
-        || context.egui_is_using_pointer()
-        || context.any_popup_open()
-        || context.is_pointer_over_egui();
+    input.popup = context.any_popup_open();
+    input.pointer =
+        outside || context.egui_is_using_pointer() || input.popup || context.is_pointer_over_egui();
     input.keyboard = context.text_edit_focused();
 }
 

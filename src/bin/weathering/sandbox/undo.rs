@@ -104,8 +104,9 @@ pub fn plugin(app: &mut App) {
 }
 
 fn press(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
-    let control = keys.any_pressed([KeyCode::ControlLeft, KeyCode::ControlRight]);
-    if control && keys.just_pressed(KeyCode::KeyZ) {
+    // Also where a slow frame has seen it pressed and let go of.
+    let control = [KeyCode::ControlLeft, KeyCode::ControlRight];
+    if (keys.any_pressed(control) || keys.any_just_pressed(control)) && keys.just_pressed(KeyCode::KeyZ) {
         commands.queue(undo);
     }
 }

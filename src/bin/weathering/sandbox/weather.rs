@@ -1,7 +1,10 @@
 //! The weather: temperature, humidity, wind and sun; and rain over the whole scene, whatever the scenario has.
+//!
+//! While a session is recorded the rain is an emitter of its scenario, and the sliders follow that one: time may go back.
 
 use bevy::prelude::*;
 use bevy_egui::egui;
+use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::collision::CollisionScene;
 use bevy_weathering::emitter::{Emitter, EmitterShape, Flow};
 use bevy_weathering::record::{ExtraEmitter, Recording};
@@ -37,8 +40,42 @@ impl Default for Rain {
     }
 }
 
+impl Rain {
+    /// How much falls, mm/h, and particles a second.
+    fn amount(&self) -> [f32; 2] {
+        [self.mm_per_h, self.rate]
+    }
+}
+
+/// The rain of a recording, as it was when the sliders were last set to it.
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
+struct Followed {
+    /// At the start, before the events of the first tick.
+    first: Option<[f32; 2]>,
+    seen: Option<[f32; 2]>,
+}
+
+impl Followed {
+    /// What the sliders are to be set to, if events have made another rain since. `shown`: by the sliders now; `tick`: the last one
+    /// that has run.
+    fn look(&mut self, shown: [f32; 2], tick: u32, cloud: &Emitter) -> Option<[f32; 2]> {
+        let first = *self.first.get_or_insert(shown);
+        let now = match cloud.flow {
+            _ if tick == 0 => first,
+            _ if !cloud.enabled => [0.0, cloud.rate],
+            Flow::MmPerHour(mm_per_h) => [mm_per_h, cloud.rate],
+            _ => [shown[0], cloud.rate],
+        };
+        (self.seen.replace(now) != Some(now)).then_some(now)
+    }
+}
+
 pub fn plugin(app: &mut App) {
-    app.init_resource::<Rain>().add_systems(Update, follow_scene).add_panel(Place::Side, "Weather", show);
+    app.init_resource::<Rain>().add_systems(Update, (follow_scene, follow_recording)).add_panel(
+        Place::Side,
+        "Weather",
+        show,
+    );
 }
 
 fn show(ui: &mut egui::Ui, world: &mut World) {
@@ -64,10 +101,12 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     let mut height_deg = towards.y.clamp(-1.0, 1.0).asin().to_degrees();
     let mut around_deg = towards.x.atan2(-towards.z).to_degrees();
     let angles = (height_deg, around_deg);
-    number(ui, "height, degrees", &mut height_deg, (1.0, 89.0), "Above the horizon");
-    number(ui, "around, degrees", &mut around_deg, (-180.0, 180.0), "0 is -z, 90 is +x");
     // A recording keeps the sun where it is.
-    let moved = (height_deg, around_deg) != angles && !world.contains_resource::<Recording>();
+    ui.add_enabled_ui(!world.contains_resource::<Recording>(), |ui| {
+        number(ui, "height, degrees", &mut height_deg, (1.0, 89.0), "Above the horizon");
+        number(ui, "around, degrees", &mut around_deg, (-180.0, 180.0), "0 is -z, 90 is +x");
+    });
+    let moved = (height_deg, around_deg) != angles;
     if moved {
         weather.sun_direction = -towards_sun(height_deg, around_deg);
     }
@@ -193,13 +232,38 @@ pub fn to_record(world: &World) -> Option<ExtraEmitter> {
     Some(ExtraEmitter { spec, effect: effects::text(&rain.effect)?.into(), is_on })
 }
 
+/// Sets the sliders to what a recording has made of the rain: time has gone back, or what was recorded runs again.
+fn follow_recording(
+    recording: Option<Res<Recording>>,
+    clock: Res<WeatheringClock>,
+    clouds: Query<&Emitter, (With<OwnRain>, Without<CopyOf>)>,
+    mut rain: ResMut<Rain>,
+    mut followed: Local<Followed>,
+) {
+    if recording.is_none() {
+        *followed = Followed::default();
+        return;
+    }
+    let Some(cloud) = clouds.iter().next() else { return };
+    if let Some([mm_per_h, rate]) = followed.look(rain.amount(), clock.tick(), cloud) {
+        (rain.mm_per_h, rain.rate) = (mm_per_h, rate);
+    }
+}
+
+/// The rain of a recording that has ended is an emitter of the scene like others: the sliders are about none.
+pub fn let_go(world: &mut World) {
+    world.resource_mut::<Rain>().mm_per_h = 0.0;
+}
+
 /// The rain falls on all of the scene, also when another is opened, or when it grows.
 fn follow_scene(
     scene: Res<CollisionScene>,
     split: Option<Res<Split>>,
+    recording: Option<Res<Recording>>,
     mut clouds: Query<(&mut Emitter, &mut Transform), (With<OwnRain>, Without<CopyOf>)>,
 ) {
-    if !scene.is_changed() || scene.is_empty() {
+    // In a recording it would be somebody's doing, and in what has been recorded already a branch.
+    if !scene.is_changed() || scene.is_empty() || recording.is_some() {
         return;
     }
     let (low, high) = split::bounds(split.as_deref(), &scene);
@@ -243,6 +307,26 @@ mod tests {
         }
         assert!((wind(3.0, 90.0, 1.0) - Vec3::new(3.0, 1.0, 0.0)).length() < 1e-5);
         assert!((wind(2.0, 0.0, 0.0) - Vec3::new(0.0, 0.0, -2.0)).length() < 1e-5);
+    }
+
+    #[test]
+    fn sliders_follow_a_recording_and_stay_where_somebody_drags_them() {
+        let mut cloud = Emitter { flow: Flow::MmPerHour(10.0), rate: 2000.0, ..default() };
+        let mut followed = Followed::default();
+        let start = [0.0, 2000.0];
+        // Before its first tick the emitter is on, whatever the events of that tick will say.
+        assert_eq!(followed.look(start, 0, &cloud), Some(start));
+        cloud.enabled = false;
+        assert_eq!(followed.look(start, 1, &cloud), None);
+        // Dragged, which acts in the next tick.
+        assert_eq!(followed.look([30.0, 2000.0], 1, &cloud), None);
+        (cloud.enabled, cloud.flow) = (true, Flow::MmPerHour(30.0));
+        assert_eq!(followed.look([30.0, 2000.0], 2, &cloud), Some([30.0, 2000.0]));
+        assert_eq!(followed.look([30.0, 2000.0], 50, &cloud), None);
+        // Back, and to the start.
+        (cloud.enabled, cloud.rate) = (false, 500.0);
+        assert_eq!(followed.look([30.0, 2000.0], 20, &cloud), Some([0.0, 500.0]));
+        assert_eq!(followed.look([0.0, 500.0], 0, &cloud), Some(start));
     }
 
     #[test]
