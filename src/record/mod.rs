@@ -2,7 +2,7 @@
 //!
 //! A session is a run of a scenario ([`prepare`]) to which events are added while it runs. Between ticks everything that may be
 //! changed is compared with what events have made of it (`watch`): the weather, what surfaces are made of, emitters, where they
-//! are and whether they are on, brush strokes that wait. What was changed is taken back and becomes an event of the tick that comes
+//! are and whether they are on, brush strokes that wait; emitters may come and go (`emitters`). What was changed is taken back and becomes an event of the tick that comes
 //! next, in which the code acts that acts in a replay. So whoever changes it, and by whatever way, it acts as it will act again, and
 //! the [`Digest`](crate::scenario::Digest) of the session is that of a replay of what is written down.
 //!
@@ -21,6 +21,7 @@
 
 mod actions;
 mod base;
+mod emitters;
 mod error;
 mod file;
 mod history;

@@ -82,6 +82,7 @@ fn go_to_tick(world: &mut World, target: u32) -> Result<(), RecordError> {
     let is_live = recording.is_live();
     if is_live {
         recording.watched.forget_wishes();
+        recording.changes.clear();
         reset_scenario(world);
         recording.watched.look(world);
         recording.tick = 0;
