@@ -1,9 +1,9 @@
 //! Emitters that come and go in a session.
 //!
-//! A scenario has all its emitters from the start. So one that is added comes behind those that are there, is switched on by an event
-//! of the tick in which it was added, and is off before; one that is removed is switched off for good. In the seconds in which it
-//! is not there yet, or no more, nothing that is done to it counts, and [`Recording::has_emitter`] says so. A branch from before its
-//! time knows nothing of it; the file of its effect stays, since the file of the old branch names it.
+//! A scenario has all its emitters from the start. So one that is added comes behind those that are there, is switched on by an
+//! event of the tick in which it was added, and is off before; one that is removed is switched off for good. In the seconds in
+//! which it is not there yet, or no more, nothing that is done to it counts, and [`Recording::has_emitter`] says so. A branch from
+//! before its time knows nothing of it; the file of its effect stays, since the file of the old branch names it.
 
 use std::path::Path;
 
