@@ -209,3 +209,30 @@ fn links_of_the_readme_lead_somewhere_from_anywhere() {
         assert!(address.starts_with("https://") && address.ends_with(&format!("/main/{file}")), "{address}");
     }
 }
+
+#[test]
+fn every_asset_is_credited_and_nothing_else() {
+    const CREDITS: &str = include_str!("../assets/CREDITS.md");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets");
+    let (mut folders, mut count) = (vec![root.clone()], 0);
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+                continue;
+            }
+            let name = path.strip_prefix(&root).unwrap().to_string_lossy().replace('\\', "/");
+            if name != "CREDITS.md" {
+                assert!(CREDITS.contains(&format!("| `{name}` |")), "{name}");
+                count += 1;
+            }
+        }
+    }
+    let credited = CREDITS.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next());
+    let credited: Vec<&str> = credited.collect();
+    assert_eq!(credited.len(), count);
+    for name in credited {
+        assert!(root.join(name).is_file(), "{name}");
+    }
+}

@@ -1,5 +1,7 @@
 //! Sessions that are recorded, gone back in and replayed, in whole apps without a renderer and by the program.
 
+mod emitters;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;

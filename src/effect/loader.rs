@@ -101,6 +101,15 @@ impl WeatherEffect {
         Ok(effect)
     }
 
+    /// The text of an effect file, which [`Self::from_ron`] reads to the same effect, but for its stamps: those are made anew, or
+    /// read from the files that it names.
+    ///
+    /// # Errors
+    /// [`ron::Error`]; there is none for an effect that is valid.
+    pub fn to_ron(&self) -> Result<String, ron::Error> {
+        ron::to_string(self)
+    }
+
     /// Checks every number against the range its field documents.
     ///
     /// # Errors
@@ -157,12 +166,22 @@ fn within(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effect::ShippedEffect;
 
     #[test]
     fn the_default_is_valid_and_survives_a_round_trip() {
         let effect = WeatherEffect::default();
         let text = ron::to_string(&effect).unwrap();
         assert_eq!(WeatherEffect::from_ron(text.as_bytes()).unwrap(), effect);
+    }
+
+    #[test]
+    fn what_is_written_is_read_as_it_was() {
+        for shipped in ShippedEffect::ALL {
+            let effect = WeatherEffect::from_ron(shipped.ron.as_bytes()).unwrap();
+            let text = effect.to_ron().unwrap();
+            assert_eq!(WeatherEffect::from_ron(text.as_bytes()).unwrap(), effect, "{text}");
+        }
     }
 
     #[test]

@@ -10,6 +10,7 @@ use std::path::Path;
 use bevy::prelude::*;
 
 use super::RecordError;
+use super::emitters::{free_file, free_name};
 use super::file::{text_of, write};
 use crate::input::read_file;
 use crate::material::{PorousMaterial, StandingWater};
@@ -67,8 +68,8 @@ impl Beginning {
 /// Writes what a session begins with into a folder, and reads it from there: a scenario to switch to, and then to
 /// [`begin`](super::begin) with. Needs no world: it can be done on another thread.
 ///
-/// Of the scenario, working hours of emitters become events, so that hands can take over from them; expectations and captures
-/// are left out, since they are about another run. It goes on for as long as a scenario may.
+/// Of the scenario, working hours of emitters become events, so that hands can take over from them; expectations, captures and
+/// exports are left out, since they are about another run. It goes on for as long as a scenario may.
 ///
 /// # Errors
 /// [`RecordError`]; also if the folder holds a recording of this scenario already. Files that were copied before stay.
@@ -93,7 +94,9 @@ pub fn prepare(
         let place = folder.join(path.strip_prefix(&loaded.tree).unwrap_or(&path));
         write(&place, &bytes)?;
     }
-    scenario.events.retain(|event| !matches!(event.what, Action::Expect(_) | Action::Capture(_)));
+    let is_of_a_run =
+        |what: &Action| matches!(what, Action::Expect(_) | Action::Capture(_) | Action::Export(_));
+    scenario.events.retain(|event| !is_of_a_run(&event.what));
     scenario.seconds = Scenario::MAX_SECONDS;
     if let Some(weather) = beginning.weather {
         let Weather { temperature_c, humidity, wind, sun_direction, sun_w_per_m2, drying_speed } = weather;
@@ -120,13 +123,8 @@ pub fn prepare(
 fn switch_by_events(scenario: &mut Scenario, length: f32, events: &mut Vec<EventSpec>) {
     let mut names = BTreeSet::new();
     for spec in &mut scenario.emitters {
-        let name = spec.name.clone();
-        for number in 2.. {
-            if names.insert(spec.name.clone()) {
-                break;
-            }
-            spec.name = format!("{name} {number}");
-        }
+        spec.name = free_name(&spec.name, |name| names.contains(name));
+        names.insert(spec.name.clone());
         let is_switched = scenario.events.iter().any(
             |event| matches!(&event.what, Action::Start(name) | Action::Stop(name) if *name == spec.name),
         );
@@ -153,15 +151,7 @@ fn add_emitters(
         if scenario.emitters.iter().any(|other| other.name == spec.name) {
             continue;
         }
-        let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
-        let name: String = spec.name.chars().map(plain).collect();
-        // Names may differ by what is not plain alone.
-        let named = |number: u32| match number {
-            1 => format!("recorded_{name}.effect.ron"),
-            _ => format!("recorded_{name}_{number}.effect.ron"),
-        };
-        let free = (1..).map(named).find(|file| !folder.join(file).exists());
-        spec.effect = free.unwrap_or_else(|| named(1));
+        spec.effect = free_file(folder, &spec.name);
         write(&folder.join(&spec.effect), effect.as_bytes())?;
         (spec.start, spec.stop) = (0.0, None);
         if !is_on {
@@ -205,7 +195,8 @@ mod tests {
             (name: "tap", effect: "effects/tap.effect.ron", rate: 1.0, speed: 1.0,
              keys: [(position: (0.0, 2.0, 0.0), target: (0.0, 0.0, 0.0))]),
         ],
-        events: [(at: 2.0, what: Expect(quantity: Particles, above: 1.0)), (at: 2.0, what: Capture("x"))],
+        events: [(at: 2.0, what: Expect(quantity: Particles, above: 1.0)), (at: 2.0, what: Capture("x")),
+            (at: 2.0, what: Export("x"))],
     )"#;
 
     fn scene(folder: &Path) -> LoadedScenario {

@@ -52,6 +52,11 @@ impl History {
         self.moments.retain(|moment| moment.tick <= tick);
     }
 
+    /// Of a session that has so many emitters now.
+    pub(super) fn resize_emitters(&mut self, count: usize) {
+        self.moments.iter_mut().for_each(|moment| moment.scene.resize_emitters(count));
+    }
+
     /// How many there are, and their bytes.
     pub(super) fn size(&self) -> (usize, usize) {
         (self.moments.len(), self.moments.iter().map(|moment| moment.bytes).sum())

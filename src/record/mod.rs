@@ -2,9 +2,10 @@
 //!
 //! A session is a run of a scenario ([`prepare`]) to which events are added while it runs. Between ticks everything that may be
 //! changed is compared with what events have made of it (`watch`): the weather, what surfaces are made of, emitters, where they
-//! are and whether they are on, brush strokes that wait. What was changed is taken back and becomes an event of the tick that comes
-//! next, in which the code acts that acts in a replay. So whoever changes it, and by whatever way, it acts as it will act again, and
-//! the [`Digest`](crate::scenario::Digest) of the session is that of a replay of what is written down.
+//! are and whether they are on, brush strokes that wait; emitters may come and go (`emitters`). What was changed is taken back
+//! and becomes an event of the tick that comes next, in which the code acts that acts in a replay. So whoever changes it, and by
+//! whatever way, it acts as it will act again, and the [`Digest`](crate::scenario::Digest) of the session is that of a replay of
+//! what is written down.
 //!
 //! What cannot be said by an event is either taken back and told ([`Recording::take_notes`]), such as another place of the sun, or
 //! stays and is a *flaw* ([`Recording::flaws`]), which the file names and every replay of it tells: effects that are edited,
@@ -40,6 +41,7 @@
 
 mod actions;
 mod base;
+mod emitters;
 mod error;
 mod file;
 mod history;

@@ -6,6 +6,7 @@ use bevy::prelude::*;
 
 use super::RecordError;
 use super::actions::{Recorded, all_events};
+use super::emitters::Change;
 use super::file::{text_of, write};
 use super::history::History;
 use super::watch::{Complaints, Watched};
@@ -39,11 +40,13 @@ pub struct Recording {
     /// The scenario that runs, with the events of now.
     pub(super) loaded: LoadedScenario,
     /// Those that it had at the start.
-    base: Vec<EventSpec>,
+    pub(super) base: Vec<EventSpec>,
     /// In order of their ticks.
     pub(super) actions: Vec<Recorded>,
     /// Waiting for the next tick; added by the app.
     others: Vec<Action>,
+    /// Emitters that come or go in the next tick.
+    pub(super) changes: Vec<Change>,
     /// Number of the stroke that is being painted, or was last.
     stroke: u32,
     flaws: Vec<(u32, &'static str)>,
@@ -174,7 +177,7 @@ impl Recording {
         self.flaws.push((self.tick, flaw));
     }
 
-    fn add_note(&mut self, note: impl Into<String>) {
+    pub(super) fn add_note(&mut self, note: impl Into<String>) {
         let note = note.into();
         if !self.notes.contains(&note) {
             self.notes.push(note);
@@ -190,6 +193,7 @@ impl Recording {
     /// Strokes that wait go with the reset.
     pub(super) fn forget_wishes(&mut self) {
         self.others.clear();
+        self.changes.clear();
         self.watched.forget_wishes();
     }
 
@@ -201,7 +205,7 @@ impl Recording {
         }
         let is_live = self.is_live();
         let mut complaints = Complaints::default();
-        self.watched.take_back(world, is_live, &mut complaints);
+        self.watched.take_back(world, is_live, self.tick, &mut complaints);
         if is_live {
             self.watched.look_for_strangers(world, &mut complaints);
             self.tell(complaints);
@@ -287,7 +291,7 @@ impl Recording {
     }
 
     /// What was done in this tick or later is no more; it is written into a file of its own.
-    fn branch(&mut self, world: &mut World, tick: u32) {
+    pub(super) fn branch(&mut self, world: &mut World, tick: u32) {
         let kept = self.actions.partition_point(|action| action.tick < tick);
         if kept < self.actions.len() {
             let old = free_file(&self.loaded.file);
@@ -300,6 +304,7 @@ impl Recording {
         self.actions.truncate(kept);
         self.flaws.retain(|(at, _)| *at < tick);
         self.history.forget_after(tick.saturating_sub(1));
+        self.forget_emitters(world, tick);
         self.end = tick;
     }
 
@@ -346,6 +351,7 @@ pub fn begin(world: &mut World, base: LoadedScenario) {
         loaded: base,
         actions: Vec::new(),
         others: Vec::new(),
+        changes: Vec::new(),
         stroke: 0,
         flaws: Vec::new(),
         notes: Vec::new(),
@@ -398,7 +404,8 @@ pub(super) fn begin_tick(world: &mut World) {
             take_strokes(world);
             return;
         }
-        let actions = recording.take_actions(world, tick);
+        let mut actions = recording.change_emitters(world, tick);
+        actions.extend(recording.take_actions(world, tick));
         if !actions.is_empty() {
             recording.record(world, tick, actions);
         }

@@ -30,16 +30,20 @@ struct WatchedSurface {
 }
 
 /// An emitter as events have made it, and what it is to become.
-struct WatchedEmitter {
-    entity: Entity,
+pub(super) struct WatchedEmitter {
+    pub(super) entity: Entity,
     emitter: Emitter,
     transform: Transform,
-    wanted: EmitterAdjustment,
-    switch: Option<bool>,
+    pub(super) wanted: EmitterAdjustment,
+    pub(super) switch: Option<bool>,
     /// Position and target.
-    pose: Option<(Vec3, Vec3)>,
+    pub(super) pose: Option<(Vec3, Vec3)>,
     /// The tick of its last move.
     moved: u32,
+    /// The tick in which it was added; 0 from the start.
+    pub(super) since: u32,
+    /// The tick in which it was removed.
+    pub(super) gone: Option<u32>,
 }
 
 /// All that is watched.
@@ -49,7 +53,7 @@ pub(super) struct Watched {
     /// In the order of the scenario.
     surfaces: Vec<WatchedSurface>,
     /// In the order of their streams.
-    emitters: Vec<WatchedEmitter>,
+    pub(super) emitters: Vec<WatchedEmitter>,
 }
 
 /// What cannot be written down.
@@ -92,23 +96,10 @@ impl Watched {
             })
             .collect();
         surfaces.sort_by_key(|(index, _)| *index);
-        let mut query =
-            world.query_filtered::<(Entity, &Emitter, &Transform, Option<&Name>), With<SceneEntity>>();
-        let mut emitters: Vec<_> = query
-            .iter(world)
-            .map(|(entity, emitter, transform, name)| WatchedEmitter {
-                entity,
-                emitter: emitter.clone(),
-                transform: *transform,
-                wanted: EmitterAdjustment {
-                    emitter: name.map(ToString::to_string).unwrap_or_default(),
-                    ..default()
-                },
-                switch: None,
-                pose: None,
-                moved: 0,
-            })
-            .collect();
+        let mut query = world.query_filtered::<Entity, (With<SceneEntity>, With<Emitter>)>();
+        let world: &World = world;
+        let mut emitters: Vec<_> =
+            query.iter(world).filter_map(|entity| WatchedEmitter::new(world, entity)).collect();
         emitters.sort_by_key(|watched| watched.emitter.stream);
         Self {
             weather: *world.resource::<Weather>(),
@@ -135,14 +126,21 @@ impl Watched {
         }
     }
 
-    /// Takes back what was changed since events last acted. `wants`: it is to happen in the next tick.
-    pub(super) fn take_back(&mut self, world: &mut World, wants: bool, complaints: &mut Complaints) {
+    /// Takes back what was changed since events last acted. `wants`: it is to happen in the next tick; `tick`: the last one.
+    pub(super) fn take_back(
+        &mut self,
+        world: &mut World,
+        wants: bool,
+        tick: u32,
+        complaints: &mut Complaints,
+    ) {
         self.take_back_weather(world, wants, complaints);
         for watched in &mut self.surfaces {
             watched.take_back(world, wants, complaints);
         }
         for watched in &mut self.emitters {
-            watched.take_back(world, wants, complaints);
+            let is_there = watched.is_there(tick);
+            watched.take_back(world, wants && is_there, complaints);
         }
     }
 
@@ -266,6 +264,23 @@ impl WatchedSurface {
 }
 
 impl WatchedEmitter {
+    /// An emitter as it is, that has been there from the start.
+    pub(super) fn new(world: &World, entity: Entity) -> Option<Self> {
+        let found = world.get_entity(entity).ok()?;
+        let name = found.get::<Name>().map(ToString::to_string).unwrap_or_default();
+        Some(Self {
+            entity,
+            emitter: found.get::<Emitter>()?.clone(),
+            transform: *found.get::<Transform>()?,
+            wanted: EmitterAdjustment { emitter: name, ..default() },
+            switch: None,
+            pose: None,
+            moved: 0,
+            since: 0,
+            gone: None,
+        })
+    }
+
     fn take_back(&mut self, world: &mut World, wants: bool, complaints: &mut Complaints) {
         let Ok(mut entity) = world.get_entity_mut(self.entity) else {
             complaints.flaws.push("an emitter was taken away");
@@ -362,7 +377,7 @@ mod tests {
     /// What is to happen in a tick.
     fn actions(world: &mut World, watched: &mut Watched, tick: u32) -> Vec<Action> {
         let (mut complaints, mut actions) = (Complaints::default(), Vec::new());
-        watched.take_back(world, true, &mut complaints);
+        watched.take_back(world, true, tick, &mut complaints);
         watched.take_actions(tick, 60, &mut actions);
         assert!(complaints.flaws.is_empty() && complaints.refused.is_empty());
         actions
@@ -387,9 +402,9 @@ mod tests {
         assert!(actions(&mut world, &mut watched, 3).is_empty());
         // The weather, by what of it was changed.
         world.resource_mut::<Weather>().humidity = 0.9;
-        watched.take_back(&mut world, true, &mut Complaints::default());
+        watched.take_back(&mut world, true, 3, &mut Complaints::default());
         world.resource_mut::<Weather>().wind = Vec3::X;
-        watched.take_back(&mut world, true, &mut Complaints::default());
+        watched.take_back(&mut world, true, 3, &mut Complaints::default());
         let expected = WeatherChange { humidity: Some(0.9), wind: Some(Vec3::X), ..default() };
         assert_eq!(watched.take_weather(), Some(expected));
         assert_eq!((watched.take_weather(), *world.resource::<Weather>()), (None, Weather::default()));
@@ -420,13 +435,13 @@ mod tests {
         let (mut world, _, surface, mut watched) = scene();
         world.resource_mut::<Weather>().sun_w_per_m2 = 500.0;
         let mut complaints = Complaints::default();
-        watched.take_back(&mut world, true, &mut complaints);
+        watched.take_back(&mut world, true, 0, &mut complaints);
         assert_eq!(complaints.refused.len(), 1);
         assert_eq!(world.resource::<Weather>().sun_w_per_m2, 0.0);
         assert_eq!(watched.take_weather(), None);
         world.despawn(surface);
         world.spawn(Emitter::default());
-        watched.take_back(&mut world, true, &mut complaints);
+        watched.take_back(&mut world, true, 0, &mut complaints);
         watched.look_for_strangers(&mut world, &mut complaints);
         assert_eq!(complaints.flaws.len(), 2);
     }

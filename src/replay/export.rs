@@ -1,11 +1,11 @@
-//! The scene at the end of a run, for other engines.
+//! The scene at the end of a run, or on the way, for other engines.
 
 use bevy::prelude::*;
 
-use super::{ReplayError, Run, SurfaceMaps};
+use super::{ReplayError, ReplayOptions, Run, SurfaceMaps};
 use crate::export::{Export, ExportError, Snapshot, SurfaceColors};
 use crate::save::ColorMaps;
-use crate::scenario::ScenarioSurface;
+use crate::scenario::{ScenarioSurface, exports};
 
 impl From<ExportError> for ReplayError {
     fn from(error: ExportError) -> Self {
@@ -13,12 +13,35 @@ impl From<ExportError> for ReplayError {
     }
 }
 
+impl ReplayOptions {
+    /// Whether the scene is exported, at the end or on the way.
+    pub(super) fn exports(&self) -> bool {
+        self.export.is_some() || (self.out.is_some() && !exports(&self.scenario.scenario).is_empty())
+    }
+
+    /// How an exported scene begins its name.
+    pub(super) fn stem(&self) -> String {
+        self.scenario.file.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    }
+}
+
 impl Run<'_> {
-    /// The scene as it is now, if it is asked for. `maps`: those of now, in the order of the scenario.
-    pub(super) fn export(&mut self, maps: &[SurfaceMaps]) -> Result<Option<Export>, ReplayError> {
-        if self.options.export.is_none() {
-            return Ok(None);
+    /// Exports the scene as it is now into a folder in that of the run. That it fails is no reason to lose the rest: it is told at
+    /// the end.
+    pub(super) fn export_into(&mut self, folder: &str) -> Result<(), ReplayError> {
+        let options = self.options;
+        let Some(out) = &options.out else { return Ok(()) };
+        let maps = self.read_maps()?;
+        let written =
+            self.export(&maps).and_then(|export| Ok(export.write(&out.join(folder), &options.stem())?));
+        if let Err(error) = written {
+            self.failed_export.get_or_insert(error);
         }
+        Ok(())
+    }
+
+    /// The scene as it is now. `maps`: those of now, in the order of the scenario.
+    pub(super) fn export(&mut self, maps: &[SurfaceMaps]) -> Result<Export, ReplayError> {
         let name = self.options.scenario.file.file_name().unwrap_or_default().to_string_lossy();
         let world = self.app.world_mut();
         let mut colors = SurfaceColors::default();
@@ -31,6 +54,6 @@ impl Run<'_> {
                 Some((entity, ColorMaps { diffuse, specular, normal: maps.normal.clone() }))
             }));
         }
-        Ok(Some(Snapshot::take(world, &name, &colors)?.bake(None)?))
+        Ok(Snapshot::take(world, &name, &colors)?.bake(None)?)
     }
 }

@@ -38,9 +38,14 @@ pub(super) fn capture_file(name: &str) -> String {
     format!("capture_{name}.png")
 }
 
+/// The folder of an export that an event asked for.
+pub(super) fn export_folder(name: &str) -> String {
+    format!("export_{name}")
+}
+
 /// Removes what an earlier run left in the folder, so that nothing of it stands beside this one's files: pictures from
-/// number `first` on, captures but for those in `kept`, maps and report. The pictures before are those of the run that this
-/// one goes on with.
+/// number `first` on, captures and exports but for those in `kept`, maps and report. The pictures before are those of the run
+/// that this one goes on with.
 ///
 /// # Errors
 /// [`ReplayError::Write`] with the file.
@@ -54,20 +59,44 @@ pub(super) fn remove_earlier_run(folder: &Path, first: u32, kept: &[String]) -> 
         name.starts_with("capture_") && name.ends_with(".png") && !kept.iter().any(|file| file == name)
     };
     let is_map = |name: &str| MAP_NAMES.iter().any(|map| name.ends_with(&format!("_{map}.png")));
-    let ours: [(&Path, &dyn Fn(&str) -> bool); 2] = [
-        (folder, &|name| name == "report.json" || is_frame(name) || is_capture(name)),
-        (&folder.join("maps"), &is_map),
-    ];
-    for (folder, is_ours) in ours {
-        let Ok(entries) = fs::read_dir(folder) else { continue };
-        for entry in entries.filter_map(Result::ok) {
-            if entry.file_name().to_str().is_some_and(is_ours) {
-                let path = entry.path();
-                fs::remove_file(&path).map_err(|source| ReplayError::Write { path, source })?;
-            }
+    remove_files(folder, |name| name == "report.json" || is_frame(name) || is_capture(name))?;
+    remove_files(&folder.join("maps"), is_map)?;
+    for export in exports(folder) {
+        let is_kept = |name: &str| kept.iter().any(|folder| folder == name);
+        if export.file_name().and_then(|name| name.to_str()).is_some_and(is_kept) {
+            continue;
+        }
+        let maps = export.join("maps");
+        remove_files(&export, |name| name == "report.json" || name.ends_with("_weathered.glb"))?;
+        remove_files(&maps, is_map)?;
+        // What somebody else has put there stays, and then so do they.
+        for folder in [maps, export] {
+            fs::remove_dir(folder).ok();
         }
     }
     Ok(())
+}
+
+/// Removes the files of these names from a folder, if it is there.
+fn remove_files(folder: &Path, is_ours: impl Fn(&str) -> bool) -> Result<(), ReplayError> {
+    let Ok(entries) = fs::read_dir(folder) else { return Ok(()) };
+    for entry in entries.filter_map(Result::ok) {
+        if entry.file_name().to_str().is_some_and(&is_ours) {
+            let path = entry.path();
+            fs::remove_file(&path).map_err(|source| ReplayError::Write { path, source })?;
+        }
+    }
+    Ok(())
+}
+
+/// The folders of a run's exports. Links are none: what they lead to is not the run's.
+fn exports(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
+    let is_export = |entry: &fs::DirEntry| {
+        entry.file_type().is_ok_and(|kind| kind.is_dir())
+            && entry.file_name().to_str().is_some_and(|name| name.starts_with("export_"))
+    };
+    entries.filter(is_export).map(|entry| entry.path()).collect()
 }
 
 /// Tells that all of a folder is there, and what it was made from: written last, removed first.
@@ -91,8 +120,9 @@ pub(super) fn remove_earlier_outputs(folder: &Path) -> Result<(), ReplayError> {
             _ => {}
         }
     }
-    for folder in [folder, &maps, &plots] {
-        remove_temporaries(folder).map_err(|source| ReplayError::Write { path: folder.into(), source })?;
+    let exports = exports(folder).into_iter().flat_map(|export| [export.join("maps"), export]);
+    for folder in [folder.to_path_buf(), maps, plots].into_iter().chain(exports) {
+        remove_temporaries(&folder).map_err(|source| ReplayError::Write { path: folder, source })?;
     }
     Ok(())
 }
@@ -120,6 +150,8 @@ mod tests {
             ".weathering-a1B2c3.tmp",
             "maps/.weathering-ABCDEF.tmp",
             "plots/.weathering-123456.tmp",
+            "export_a/.weathering-abcdef.tmp",
+            "export_a/maps/.weathering-fedcba.tmp",
         ];
         let others = ["my.csv", "plots/mine.svg", ".tmp", ".a1B2c3.tmp", "frame_00000.png"];
         for name in made.iter().chain(&below).chain(&others) {
@@ -162,14 +194,26 @@ mod tests {
             "maps/a_b_film.png",
             "maps/a_since.png",
             "capture_a.png",
+            "export_a/a_weathered.glb",
+            "export_a/report.json",
+            "export_a/maps/a_film.png",
+            "export_b/b_weathered.glb",
         ];
-        let others = ["frame_1.png", "frame_abcde.png", "notes.txt", "maps/mine.png"];
+        let others = [
+            "frame_1.png",
+            "frame_abcde.png",
+            "notes.txt",
+            "maps/mine.png",
+            "export_b/mine.glb",
+            "exports/a.glb",
+        ];
         for name in ours.iter().chain(&others) {
             write_atomic(&folder.path().join(name), b"x").unwrap();
         }
         remove_earlier_run(folder.path(), 0, &[]).unwrap();
         assert!(ours.iter().all(|name| !folder.path().join(name).exists()));
         assert!(others.iter().all(|name| folder.path().join(name).exists()));
+        assert!(!folder.path().join("export_a").exists());
         remove_earlier_run(&folder.path().join("nowhere"), 0, &[]).unwrap();
     }
 
@@ -177,13 +221,13 @@ mod tests {
     fn pictures_of_the_run_that_is_gone_on_with_stay() {
         let folder = tempfile::tempdir().unwrap();
         let (before, after) = (
-            ["frame_00000.png", "frame_00011.png", "capture_a.png"],
-            ["frame_00012.png", "frame_100000.png"],
+            ["frame_00000.png", "frame_00011.png", "capture_a.png", "export_a/report.json"],
+            ["frame_00012.png", "frame_100000.png", "export_ab/report.json"],
         );
         for name in before.iter().chain(&after) {
             write_atomic(&folder.path().join(name), b"x").unwrap();
         }
-        remove_earlier_run(folder.path(), 12, &[capture_file("a")]).unwrap();
+        remove_earlier_run(folder.path(), 12, &[capture_file("a"), export_folder("a")]).unwrap();
         assert!(before.iter().all(|name| folder.path().join(name).exists()));
         assert!(after.iter().all(|name| !folder.path().join(name).exists()));
     }

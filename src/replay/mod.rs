@@ -9,6 +9,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `frame_00000.png`, ... | pictures |
+//! | `capture_<name>.png`, `export_<name>/` | pictures and exports that events ask for |
 //! | `maps/` | all maps of all surfaces at the end |
 //! | `series.csv`, `timings.csv` | a row every so often: amounts and particles; how long ticks took |
 //! | `plots/*.svg` | these rows as lines |
@@ -23,6 +24,7 @@ mod export;
 mod failure;
 mod files;
 mod maps;
+mod moments;
 mod plot;
 mod plots;
 mod report;
@@ -42,7 +44,7 @@ use crate::export::{Export, ExportError};
 use crate::overlay::{SplatBudget, SplatStats};
 use crate::picture::PictureError;
 use crate::save::{ColorMaps, SaveError, SavedScene};
-use crate::scenario::{LoadedScenario, ScenarioError, ScenarioPlugin, ScenarioStatus, captures};
+use crate::scenario::{LoadedScenario, ScenarioError, ScenarioPlugin, ScenarioStatus};
 use crate::schedule::TickHold;
 
 pub(crate) use app::headless;
@@ -52,6 +54,7 @@ pub use failure::describe_render_error;
 pub use files::{DONE_FILE, write_atomic};
 pub(crate) use maps::write_maps;
 pub use maps::{SurfaceMaps, without_padding};
+use moments::Moment;
 pub(crate) use report::water_of;
 pub use report::{ParticleReport, Report, SurfaceReport, Timing, WaterReport, WorkReport};
 use series::SeriesTables;
@@ -215,9 +218,7 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
         |tick: u32| (u64::from(tick) * u64::from(options.fps)).div_ceil(u64::from(clock.hz())) as u32;
     // Those before were drawn before it was saved.
     let frames = frame_at(tick)..(if options.render { frame_at(ticks) } else { 0 });
-    let captures = captures(&options.scenario.scenario);
-    let begins = captures.partition_point(|(due, _)| *due < tick || (*due == tick && tick > 0));
-    let (taken, to_take) = captures.split_at(begins);
+    let (made, mut asked_for) = moments::asked_for(&options.scenario.scenario, tick);
     if let Some(folder) = &options.save {
         SavedScene::check_folder(folder)?;
     }
@@ -229,32 +230,30 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
         files::require_writable(out)?;
         earlier = options.resume.is_some().then(|| SeriesTables::read(out));
         files::remove_earlier_outputs(out)?;
-        let taken: Vec<_> = taken.iter().map(|(_, name)| files::capture_file(name)).collect();
-        files::remove_earlier_run(out, frames.start, &taken)?;
+        files::remove_earlier_run(out, frames.start, &made)?;
         run.begin_series(every);
     }
     let loaded = begun.elapsed();
 
     let due_at = |frame: u32| (u64::from(frame) * u64::from(clock.hz()) / u64::from(options.fps)) as u32;
-    let mut pictures: Vec<_> =
-        frames.clone().map(|frame| (due_at(frame), files::frame_file(frame))).collect();
-    if options.render {
-        let named = to_take.iter().filter(|(due, _)| *due <= ticks);
-        pictures.extend(named.map(|(due, name)| (*due, files::capture_file(name))));
-        pictures.sort_by_key(|(due, _)| *due);
-    }
-    for (due, file) in pictures {
-        run.picture(file, due - tick)?;
+    let mut moments: Vec<_> =
+        frames.clone().map(|frame| (due_at(frame), Moment::Picture(files::frame_file(frame)))).collect();
+    asked_for.retain(|(due, moment)| *due <= ticks && moment.is_made(options));
+    moments.extend(asked_for);
+    moments.sort_by_key(|(due, _)| *due);
+    let mut tell = |tick: u32| progress(Progress { tick, ticks });
+    for (due, moment) in moments {
+        match moment {
+            Moment::Picture(file) => run.picture(file, due - tick)?,
+            Moment::Export(folder) => {
+                run.go_on(due, &mut tell)?;
+                run.export_into(&folder)?;
+            }
+        }
         tick = due;
-        progress(Progress { tick, ticks });
+        tell(tick);
     }
-    while tick < ticks {
-        // Without pictures: a quarter of a second at a time, so that progress can be told.
-        let step = (clock.hz() / 4).clamp(1, ticks - tick);
-        run.advance(step)?;
-        tick += step;
-        progress(Progress { tick, ticks });
-    }
+    run.go_on(ticks, &mut tell)?;
     run.finish_captures()?;
     let mut series = run.end_series();
     if let (Some(series), Some(earlier)) = (&mut series, &earlier) {
@@ -273,7 +272,7 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
     };
     let report = report::report(run.app.world_mut(), options, &maps, timing);
     // That it fails is no reason to lose the rest.
-    let export = run.export(&maps);
+    let export = options.export.is_some().then(|| run.export(&maps));
     if let Some(out) = &options.out {
         write_maps(&out.join("maps"), &maps)?;
         if let Some(series) = &series {
@@ -291,11 +290,10 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
         });
         SavedScene::capture(run.app.world_mut(), &options.scenario, colors.collect()).write(folder)?;
     }
-    if let (Some(export), Some(folder)) = (export?, &options.export) {
-        let stem = options.scenario.file.file_stem().unwrap_or_default();
-        export.write(folder, &stem.to_string_lossy())?;
+    if let (Some(export), Some(folder)) = (export, &options.export) {
+        export?.write(folder, &options.stem())?;
     }
-    Ok(report)
+    run.failed_export.map_or(Ok(report), Err)
 }
 
 impl ReplayOptions {
@@ -378,6 +376,8 @@ struct Run<'a> {
     options: &'a ReplayOptions,
     app: App,
     target: Option<Handle<Image>>,
+    /// Why one of the exports on the way is not there.
+    failed_export: Option<ReplayError>,
 }
 
 impl<'a> Run<'a> {
@@ -386,7 +386,7 @@ impl<'a> Run<'a> {
         if options.render {
             require_adapter()?;
         }
-        let mut scenario = if options.export.is_some() && !options.render {
+        let mut scenario = if options.exports() && !options.render {
             ScenarioPlugin::with_materials(options.scenario.clone())?
         } else {
             ScenarioPlugin::new(options.scenario.clone(), options.render)?
@@ -394,7 +394,7 @@ impl<'a> Run<'a> {
         scenario.seed = options.seed;
         let mut app = app::build(options, scenario);
         let target = options.render.then(|| capture::add_target(app.world_mut(), options.size));
-        let mut run = Self { options, app, target };
+        let mut run = Self { options, app, target, failed_export: None };
         let begun = Instant::now();
         loop {
             run.step(0)?;
@@ -429,6 +429,16 @@ impl<'a> Run<'a> {
 
     fn tick(&self) -> u32 {
         self.app.world().resource::<WeatheringClock>().tick()
+    }
+
+    /// Goes on to the end of a tick: a quarter of a second at a time, so that progress can be told.
+    fn go_on(&mut self, end: u32, mut tell: impl FnMut(u32)) -> Result<(), ReplayError> {
+        let quarter = (self.app.world().resource::<WeatheringClock>().hz() / 4).max(1);
+        while self.tick() < end {
+            self.advance(quarter.min(end - self.tick()))?;
+            tell(self.tick());
+        }
+        Ok(())
     }
 
     /// A frame of `ticks` ticks, and its picture. If not all of it could be painted in one frame, the picture is taken once more

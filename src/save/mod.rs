@@ -214,6 +214,11 @@ impl SavedScene {
         maps::read(folder)
     }
 
+    /// Fits a scenario of so many emitters: those more have sent nothing yet.
+    pub(crate) fn resize_emitters(&mut self, count: usize) {
+        self.state.emitters.resize(count, EmitterState::default());
+    }
+
     /// Ticks that had run.
     pub fn tick(&self) -> u32 {
         self.state.tick

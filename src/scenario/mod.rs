@@ -44,11 +44,14 @@ pub use schema::{
     MaterialSpec, MeshSpec, Scenario, ScenarioPart, SunSpec, SurfaceSpec, SurfaceTextureSpec, TextureSpec,
     WeatherPart, WeatherSpec, WetMapSpec,
 };
+pub(crate) use spawn::spawn_emitter;
 pub use spawn::{AssetTree, ScenarioPlugin, ScenarioStatus, ScenarioSurface, SceneEntity};
 pub use switch::{PreparedScenario, switch_scenario};
 pub use timeline::{
     Action, BrushEvent, CameraMove, EmitterAdjustment, EmitterMove, EventSpec, Expectation,
     ExpectationOutcome, Expectations, MaterialChange, Quantity, WeatherChange,
 };
-pub(crate) use timeline::{beginning_of, captures, exchange_events, rewind, tick_from, weather_is_changing};
+pub(crate) use timeline::{
+    beginning_of, captures, exchange_events, exports, rewind, tick_from, weather_is_changing,
+};
 pub(crate) use validate::check_weather;

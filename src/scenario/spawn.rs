@@ -12,7 +12,7 @@ use bevy::render::RenderApp;
 use super::content::{Content, Looks};
 use super::motion::{ScenarioCamera, move_camera};
 use super::timeline::{MaterialHandles, apply_events_plugin, camera_keys, emitter_motion, insert_events};
-use super::{Digest, LoadedScenario, MeshSpec, ScenarioError};
+use super::{Digest, LoadedScenario, MeshSpec, Scenario, ScenarioError};
 use crate::clock::ClockPlugin;
 use crate::collision::{BuildColliders, MeshColliders, NotWeatherable, SurfaceCollider};
 use crate::effect::{EffectTable, WeatherEffect};
@@ -148,25 +148,8 @@ fn asset_path(world: &World, loaded: &LoadedScenario, path: &str) -> String {
 
 pub(super) fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, looks: Looks) {
     let scenario = &loaded.scenario;
-    for (index, (spec, effect)) in scenario.emitters.iter().zip(content.effects).enumerate() {
-        let handle = world.resource_mut::<Assets<WeatherEffect>>().add(effect.clone());
-        world.resource_mut::<EffectTable>().insert(handle.clone(), effect);
-        world.spawn((
-            SceneEntity,
-            Name::new(spec.name.clone()),
-            Emitter {
-                effect: handle,
-                rate: spec.rate,
-                shape: spec.shape,
-                flow: spec.flow,
-                speed: spec.initial_speed(),
-                spread: spec.spread_deg.to_radians(),
-                lifetime: spec.lifetime,
-                stream: index as u32,
-                enabled: false,
-            },
-            emitter_motion(scenario, spec),
-        ));
+    for (index, effect) in content.effects.into_iter().enumerate() {
+        spawn_emitter(world, scenario, index, effect);
     }
     let mut materials = Vec::new();
     if looks != Looks::None {
@@ -220,6 +203,31 @@ pub(super) fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: C
     if looks == Looks::All {
         spawn_view(world, loaded, content.environment);
     }
+}
+
+/// An emitter of the scenario, by its number; off until its hours or events say otherwise.
+pub(crate) fn spawn_emitter(
+    world: &mut World,
+    scenario: &Scenario,
+    index: usize,
+    effect: WeatherEffect,
+) -> Option<Entity> {
+    let spec = scenario.emitters.get(index)?;
+    let handle = world.resource_mut::<Assets<WeatherEffect>>().add(effect.clone());
+    world.resource_mut::<EffectTable>().insert(handle.clone(), effect);
+    let emitter = Emitter {
+        effect: handle,
+        rate: spec.rate,
+        shape: spec.shape,
+        flow: spec.flow,
+        speed: spec.initial_speed(),
+        spread: spec.spread_deg.to_radians(),
+        lifetime: spec.lifetime,
+        stream: index as u32,
+        enabled: false,
+    };
+    let named = (SceneEntity, Name::new(spec.name.clone()));
+    Some(world.spawn((named, emitter, emitter_motion(scenario, spec))).id())
 }
 
 fn spawn_view(

@@ -255,7 +255,11 @@ impl LoadedScenario {
         Ok(triangles)
     }
 
-    pub(super) fn validate_emitter(&self, field: &str, emitter: &EmitterSpec) -> Result<(), ScenarioError> {
+    /// Checks an emitter by itself.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] for the first thing wrong.
+    pub(crate) fn validate_emitter(&self, field: &str, emitter: &EmitterSpec) -> Result<(), ScenarioError> {
         self.resolve(&format!("{field}.effect"), &emitter.effect)?;
         self.not_negative(&format!("{field}.rate"), emitter.rate, Scenario::MAX_RATE)?;
         self.not_negative(&format!("{field}.speed"), emitter.initial_speed(), 1000.0)?;

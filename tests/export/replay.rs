@@ -1,4 +1,4 @@
-//! Scenarios that are exported at their end.
+//! Scenarios that are exported at their end, and on the way there.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -92,6 +92,42 @@ fn a_scenario_at_its_end_is_a_scene_with_or_without_a_renderer() {
     run(with.arg("--export").arg(&drawn).env("XDG_RUNTIME_DIR", folder.path())).assert_success();
     assert_eq!(read_report(&drawn), report);
     assert!(fs::read(drawn.join("garden_weathered.glb")).unwrap() == bytes);
+}
+
+#[test]
+fn a_scene_on_the_way_is_what_a_run_until_then_ends_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = garden(folder.path());
+    let events = r#"events: [(at: 0.5, what: Export("half")), (at: 1.0, what: Export("end")), "#;
+    fs::write(&file, SCENARIO.replace("events: [", events)).unwrap();
+    let [until, end, out] = ["until", "end", "out"].map(|name| folder.path().join(name));
+    // Of an earlier run.
+    fs::create_dir_all(out.join("export_old")).unwrap();
+    fs::write(out.join("export_old/garden_weathered.glb"), "old").unwrap();
+    let mut whole = replay(&file, "--no-render");
+    run(whole.arg("--export").arg(&end).arg("--out").arg(&out)).assert_success();
+    let mut half = replay(&file, "--no-render --seconds 0.5");
+    run(half.arg("--export").arg(&until)).assert_success();
+    for (name, alone) in [("export_half", &until), ("export_end", &end)] {
+        let on_the_way = out.join(name);
+        assert_eq!(read_report(&on_the_way), read_report(alone), "{name}");
+        for file in ["garden_weathered.glb", "maps/ground_film.png", "maps/bunny_wetness.png"] {
+            assert!(
+                fs::read(on_the_way.join(file)).unwrap() == fs::read(alone.join(file)).unwrap(),
+                "{name}: {file}"
+            );
+        }
+    }
+    let glb = |name: &str| fs::read(out.join(name).join("garden_weathered.glb")).unwrap();
+    assert!(glb("export_half") != glb("export_end"), "time has gone on");
+    assert!(!out.join("export_old").exists());
+    // Looking changes nothing, and without a folder there is nothing to look for.
+    let digest = |report: &Value| report["digest"].as_str().unwrap().to_owned();
+    let without = run(&mut replay(&file, "--no-render")).report();
+    fs::write(&file, SCENARIO).unwrap();
+    let plain = run(&mut replay(&file, "--no-render")).report();
+    assert_eq!(digest(&without), digest(&plain));
+    assert_eq!(digest(&read_report(&out)), digest(&plain));
 }
 
 #[test]

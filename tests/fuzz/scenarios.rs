@@ -61,6 +61,7 @@ pub const SMALL: &str = r#"(
         (at: 0.15, what: Brush(kind: Dirty, point: (0.2, 0.0, 0.0), radius: 0.2, strength: 0.1)),
         (at: 0.15, what: Material(surface: "ball", material: "brick", model: Twomey(porosity: 0.6))),
         (at: 0.2, what: Capture("half")),
+        (at: 0.2, what: Export("half")),
         (at: 0.2, what: Expect(quantity: WetFraction, surface: "floor", above: 0.0, below: 1.0)),
         (at: 0.2, what: Camera(eye: (0.0, 1.0, 1.0), target: (0.0, 0.0, 0.0))),
     ],

@@ -21,14 +21,14 @@ impl LoadedScenario {
             let expected = format!("at most {} (MAX_EVENTS)", Scenario::MAX_EVENTS);
             return Err(self.value("events", scenario.events.len(), expected));
         }
-        let mut pictures = BTreeSet::new();
+        let mut made = BTreeSet::new();
         for (index, event) in scenario.events.iter().enumerate() {
             let field = format!("events[{index}]");
             self.validate_event(&field, event)?;
-            if let Action::Capture(name) = &event.what
-                && !pictures.insert(name)
+            if let Action::Capture(name) | Action::Export(name) = &event.what
+                && !made.insert((event.what.kind(), name))
             {
-                return Err(self.value(format!("{field}.what.Capture"), name, "unique"));
+                return Err(self.value(format!("{field}.what.{}", event.what.kind()), name, "unique"));
             }
         }
         let named = in_order(scenario).into_iter().map(|(index, event)| (format!("events[{index}]"), event));
@@ -64,12 +64,12 @@ impl LoadedScenario {
             Action::Camera(step) => self.look(&field, "eye", step.eye, step.target),
             Action::Brush(brush) => self.validate_brush(&field, brush),
             Action::Material(change) => self.validate_material_change(&field, change),
-            Action::Capture(name) => self.file_name(&field, name),
+            Action::Capture(name) | Action::Export(name) => self.file_name(&field, name),
             Action::Expect(expectation) => self.validate_expectation(&field, expectation),
         }
     }
 
-    /// It becomes part of the names of files.
+    /// It becomes part of the names of files and folders, and so leads nowhere else.
     fn file_name(&self, field: &str, name: &str) -> Result<(), ScenarioError> {
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
         if name.is_empty() || name.len() > 64 || !name.chars().all(plain) {
@@ -269,6 +269,8 @@ mod tests {
             (at: 6.0, what: Adjust(emitter: "hose", flow: MmPerHour(2.0))),
             (at: 5.0, what: Adjust(emitter: "hose", shape: Sky(half_size: (1.0, 1.0)))),
             (at: 5.0, what: Capture("five")),
+            (at: 5.0, what: Export("five")),
+            (at: 6.0, what: Export("six")),
             (at: 5.0, what: Expect(quantity: WetFraction, surface: "a", above: 0.0, below: 0.5)),
             (at: 5.0, what: Expect(quantity: Particles, below: 100.0)),
         "#;
@@ -332,6 +334,12 @@ mod tests {
             ),
             (r#"(at: 1.0, what: Capture("../a"))"#, "events[0].what.Capture"),
             (r#"(at: 1.0, what: Capture("a")), (at: 2.0, what: Capture("a"))"#, "events[1].what.Capture"),
+            (r#"(at: 1.0, what: Export("../a"))"#, "events[0].what.Export"),
+            (r#"(at: 1.0, what: Export("/tmp/a"))"#, "events[0].what.Export"),
+            (r#"(at: 1.0, what: Export(".."))"#, "events[0].what.Export"),
+            (r#"(at: 1.0, what: Export(""))"#, "events[0].what.Export"),
+            (r#"(at: 11.0, what: Export("a"))"#, "events[0].at"),
+            (r#"(at: 1.0, what: Export("a")), (at: 2.0, what: Export("a"))"#, "events[1].what.Export"),
             ("(at: 1.0, what: Expect(quantity: FilmMm, above: 0.0))", "events[0].what.Expect.surface"),
             (r#"(at: 1.0, what: Expect(quantity: FilmMm, surface: "a"))"#, "events[0].what.Expect.above"),
             (

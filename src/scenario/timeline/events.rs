@@ -43,6 +43,8 @@ pub enum Action {
     Material(MaterialChange),
     /// A picture of this name is taken. Acts on nothing.
     Capture(String),
+    /// The scene is exported for other engines, under this name. Acts on nothing.
+    Export(String),
     /// Something has to be true. Acts on nothing.
     Expect(Expectation),
 }
@@ -60,13 +62,14 @@ impl Action {
             Self::Brush(_) => "Brush",
             Self::Material(_) => "Material",
             Self::Capture(_) => "Capture",
+            Self::Export(_) => "Export",
             Self::Expect(_) => "Expect",
         }
     }
 
     /// Whether what happens after it depends on it; if not, it only looks.
     pub fn acts(&self) -> bool {
-        !matches!(self, Self::Camera(_) | Self::Capture(_) | Self::Expect(_))
+        !matches!(self, Self::Camera(_) | Self::Capture(_) | Self::Export(_) | Self::Expect(_))
     }
 }
 
@@ -304,6 +307,7 @@ mod tests {
                 water: Some(StandingWater::default()),
             }),
             Action::Capture("end".into()),
+            Action::Export("end".into()),
             Action::Expect(Expectation {
                 quantity: Quantity::WetFraction,
                 surface: Some("ball".into()),
@@ -324,12 +328,13 @@ mod tests {
             (at: 1.0, what: Stop("rain")),
             (at: 2.5, what: Weather(wind: (2.0, 0.0, 0.0), over: 1.5)),
             (at: 3.0, what: Material(surface: "ball", model: Lagarde(porosity: 0.5))),
+            (at: 3.5, what: Export("wet")),
             (at: 4.0, what: Expect(quantity: FilmMm, surface: "ball", below: 0.1)),
         ]"#;
         let events: Vec<EventSpec> = ron_options().from_str(text).unwrap();
         assert_eq!(
             events.iter().map(|event| event.what.kind()).collect::<Vec<_>>(),
-            ["Stop", "Weather", "Material", "Expect"]
+            ["Stop", "Weather", "Material", "Export", "Expect"]
         );
         assert_eq!(events.iter().filter(|event| event.what.acts()).count(), 3);
         let Action::Weather(change) = &events[1].what else { panic!("{events:?}") };

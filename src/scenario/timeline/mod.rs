@@ -264,11 +264,29 @@ pub(super) fn camera_keys(scenario: &Scenario) -> Vec<CameraKey> {
 
 /// The names of pictures that are to be taken, and after which tick; in order.
 pub(crate) fn captures(scenario: &Scenario) -> Vec<(u32, &str)> {
-    let taken = in_order(scenario).into_iter().filter_map(|(_, event)| match &event.what {
-        Action::Capture(name) => Some((tick_at(event.at, scenario.tick_hz), name.as_str())),
+    named(scenario, |what| match what {
+        Action::Capture(name) => Some(name),
         _ => None,
-    });
-    taken.collect()
+    })
+}
+
+/// The names under which the scene is to be exported, and after which tick; in order.
+pub(crate) fn exports(scenario: &Scenario) -> Vec<(u32, &str)> {
+    named(scenario, |what| match what {
+        Action::Export(name) => Some(name),
+        _ => None,
+    })
+}
+
+/// The names that events give, and the ticks whose ends they see.
+fn named<'a>(
+    scenario: &'a Scenario,
+    name_of: impl Fn(&'a Action) -> Option<&'a String>,
+) -> Vec<(u32, &'a str)> {
+    let named = in_order(scenario)
+        .into_iter()
+        .filter_map(|(_, event)| Some((tick_at(event.at, scenario.tick_hz), name_of(&event.what)?.as_str())));
+    named.collect()
 }
 
 /// When an emitter works and where it is, with what events say of it.
@@ -441,10 +459,11 @@ mod tests {
     }
 
     #[test]
-    fn the_camera_and_pictures_have_their_times() {
+    fn the_camera_pictures_and_exports_have_their_times() {
         let scenario = scenario(
             r#"[(at: 2.0, what: Camera(eye: (5.0, 1.0, 2.0), target: (0.0, 0.0, 0.0))),
-                (at: 10.0, what: Capture("end")), (at: 0.0, what: Capture("start"))]"#,
+                (at: 10.0, what: Capture("end")), (at: 0.0, what: Capture("start")),
+                (at: 0.25, what: Export("early"))]"#,
         );
         let keys = camera_keys(&scenario);
         assert_eq!(
@@ -452,6 +471,7 @@ mod tests {
             [(0.0, 0.0), (2.0, 5.0), (4.0, 0.0)]
         );
         assert_eq!(captures(&scenario), [(0, "start"), (100, "end")]);
+        assert_eq!(exports(&scenario), [(3, "early")]);
         assert!(Timeline::new(&scenario).acts.is_empty());
     }
 }

@@ -141,10 +141,10 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     let count = recording.map_or_else(|| world.resource::<Undo>().count(), Recording::strokes);
     ui.horizontal(|ui| {
         let button = ui.add_enabled(count > 0, egui::Button::new("Take back"));
-        if button.on_hover_text("The last stroke (Ctrl+Z)").clicked() {
+        if button.on_hover_text("The last stroke, or emitter (Ctrl+Z)").clicked() {
             undo(world);
         }
-        ui.small(format!("{count} strokes"));
+        ui.small(format!("{count} to take back"));
     });
 }
 

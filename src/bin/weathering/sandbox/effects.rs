@@ -37,6 +37,30 @@ pub fn shipped(world: &mut World, name: &str) -> Option<Handle<WeatherEffect>> {
     Some(handle)
 }
 
+/// What an emitter can send out, by name: what comes with the project, and what else is in use.
+pub fn choices(world: &mut World) -> Vec<String> {
+    let mut all: Vec<String> = names().map(str::to_owned).collect();
+    for (name, _) in in_use(world) {
+        if !all.contains(&name) {
+            all.push(name);
+        }
+    }
+    all
+}
+
+/// The effect of this name among [`choices`].
+pub fn named(world: &mut World, name: &str) -> Option<Handle<WeatherEffect>> {
+    let own = shipped(world, name);
+    own.or_else(|| in_use(world).into_iter().find(|(other, _)| other == name).map(|(_, handle)| handle))
+}
+
+/// An effect as it is now, with what was edited of it.
+pub fn of(world: &World, handle: &Handle<WeatherEffect>) -> Option<WeatherEffect> {
+    let asset = world.resource::<Assets<WeatherEffect>>().get(handle).cloned();
+    let rows = world.resource::<EffectTable>().rows();
+    asset.or_else(|| rows.iter().find(|row| row.handle == *handle)?.effect.clone())
+}
+
 /// The effect that is being edited.
 #[derive(Resource, Default)]
 struct Edited(Option<AssetId<WeatherEffect>>);

@@ -1,4 +1,4 @@
-//! All emitters: how much, how wide, of what, on or off.
+//! All emitters: how much, how wide, of what, on or off; and others, to be added and removed.
 
 use bevy::prelude::*;
 use bevy_egui::egui;
@@ -7,6 +7,7 @@ use bevy_weathering::particle::{ParticleConfig, ParticleCounts};
 use bevy_weathering::record::Recording;
 use bevy_weathering::scenario::{ByHand, SceneEntity};
 
+use super::added::{self, Added, Removed};
 use super::effects;
 use super::hose::InHand;
 use super::split::CopyOf;
@@ -18,6 +19,9 @@ pub fn plugin(app: &mut App) {
     app.add_panel(Place::Side, "Emitters", show);
 }
 
+/// Those in the hand and over the scene have panels of their own.
+type Listed = (Without<InHand>, Without<OwnRain>, Without<CopyOf>, Without<Removed>);
+
 fn show(ui: &mut egui::Ui, world: &mut World) {
     let counts = *world.resource::<ParticleCounts>();
     ui.label(format!("{} particles in flight, {} hits", counts.alive, counts.hit));
@@ -25,11 +29,12 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
         let most = world.resource::<ParticleConfig>().max_alive;
         ui.label(format!("{} not sent: at most {most} may be in flight", counts.refused));
     }
-    // Those in the hand and over the scene have panels of their own.
-    let mut query =
-        world.query_filtered::<(Entity, &Emitter, Option<&Name>), (Without<InHand>, Without<OwnRain>, Without<CopyOf>)>();
+    added::show(ui, world);
+    let mut query = world.query_filtered::<(Entity, &Emitter, Option<&Name>), Listed>();
+    let recording = world.get_resource::<Recording>();
     let mut all: Vec<(u32, Entity, String)> = query
         .iter(world)
+        .filter(|(entity, ..)| recording.is_none_or(|recording| recording.has_emitter(*entity)))
         .map(|(entity, emitter, name)| {
             (emitter.stream, entity, name.map_or_else(|| "emitter".to_owned(), ToString::to_string))
         })
@@ -51,7 +56,8 @@ fn show_emitter(ui: &mut egui::Ui, world: &mut World, entity: Entity) {
     let mut by_hand = world.get::<ByHand>(entity).is_some();
     // What is done to a recorded one becomes an event: it is taken over by that.
     let is_recorded = world.contains_resource::<Recording>();
-    let is_scripted = world.get::<SceneEntity>(entity).is_some() && !is_recorded;
+    let is_of_scene = world.get::<SceneEntity>(entity).is_some() && world.get::<Added>(entity).is_none();
+    let is_scripted = is_of_scene && !is_recorded;
     if is_scripted {
         let about = "Its keys and working hours do not apply while it is in your hand";
         if ui.checkbox(&mut by_hand, "by hand").on_hover_text(about).changed() {
@@ -95,10 +101,14 @@ fn show_emitter(ui: &mut egui::Ui, world: &mut World, entity: Entity) {
     if let Some(state) = world.get::<EmitterState>(entity) {
         ui.small(format!("{} sent so far", state.emitted));
     }
+    let is_removed = ui.button("Remove").on_hover_text("What it has sent stays").clicked();
     if is_changed(&before, &emitter)
         && let Some(mut there) = world.get_mut::<Emitter>(entity)
     {
         *there = emitter;
+    }
+    if is_removed {
+        added::remove(world, entity);
     }
 }
 

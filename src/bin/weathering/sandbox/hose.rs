@@ -95,8 +95,8 @@ fn spray(
     }
 }
 
-/// At the right hand, below the eye, pointing at what is below the cursor some metres away.
-fn aimed(ray: Ray3d) -> Transform {
+/// At the right hand, below the eye, pointing at what is on the ray some metres away.
+pub fn aimed(ray: Ray3d) -> Transform {
     let eye = Transform::from_translation(ray.origin).looking_to(ray.direction, Vec3::Y);
     let hand = ray.origin + eye.right() * 0.12 - eye.up() * 0.1;
     eye.with_translation(hand).looking_at(ray.origin + ray.direction * 4.0, Vec3::Y)

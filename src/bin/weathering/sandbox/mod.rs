@@ -2,6 +2,7 @@
 //!
 //! Each file is a plugin of its own; those that have something to show add a panel to [`ui`].
 
+mod added;
 mod boxes;
 mod brush;
 mod camera;
@@ -121,14 +122,15 @@ fn hose_and_time(app: &mut App) {
 
 /// The other panels.
 fn scene_panels(app: &mut App) {
-    app.add_plugins((weather::plugin, emitters::plugin, effects::plugin, materials::plugin)).add_plugins((
-        views::plugin,
-        shots::plugin,
-        probe::plugin,
-        maps::plugin,
-        plots::plugin,
-        split::plugin,
-    ));
+    app.add_plugins((weather::plugin, added::plugin, emitters::plugin, effects::plugin, materials::plugin))
+        .add_plugins((
+            views::plugin,
+            shots::plugin,
+            probe::plugin,
+            maps::plugin,
+            plots::plugin,
+            split::plugin,
+        ));
 }
 
 /// Without a GPU, fluency is worth more than smooth edges.

@@ -1,8 +1,8 @@
 //! Recording what is done, as a scenario that replays to the same digest; going back in it, and branching off.
 //!
 //! A recording begins with the scene started over: what is open, as it is set, is written into a folder of its own and opened from
-//! there, with the hose in the hand and the rain over the scene as emitters of it. What is done then is found and written down
-//! by the library's `record`; here are the buttons, the time bar, and the frames that going back takes.
+//! there, with the hose in the hand, the rain over the scene and emitters that were added as emitters of it. What is done then is
+//! found and written down by the library's `record`; here are the buttons, the time bar, and the frames that going back takes.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -28,7 +28,7 @@ use super::shots::{OutFolder, free_name};
 use super::split::Split;
 use super::ui::{AddPanel, Note, Place, keyboard_is_free};
 use super::weather::{self, OwnRain};
-use super::{export, model, saving, theme};
+use super::{added, export, model, saving, theme};
 
 /// Frames between starting over and putting a moment back, in which surfaces get their new, empty maps.
 const SETTLE: u32 = 4;
@@ -152,8 +152,12 @@ fn begin(world: &mut World) {
         let (eye, target) = view.line();
         CameraKey { t: 0.0, eye, target }
     });
+    let added = match added::to_record(world) {
+        Ok(added) => added,
+        Err(why) => return world.resource_mut::<Note>().complain(why),
+    };
     let hose = hose::to_record(&world.resource::<Settings>().hose);
-    beginning.emitters = hose.into_iter().chain(weather::to_record(world)).collect();
+    beginning.emitters = hose.into_iter().chain(weather::to_record(world)).chain(added).collect();
     let loaded = world.resource::<Opened>().loaded.clone();
     let folder: PathBuf = free_name(&world.resource::<OutFolder>().0, "recorded", "");
     let task = AsyncComputeTaskPool::get().spawn(async move {

@@ -18,6 +18,7 @@ use bevy_weathering::replay::without_padding;
 use bevy_weathering::save::{ColorMaps, SaveError, SavedScene};
 use bevy_weathering::scenario::{LoadedScenario, ScenarioStatus, ScenarioSurface, reset_scenario};
 
+use super::added;
 use super::export;
 use super::hose::InHand;
 use super::leave::Leaving;
@@ -171,6 +172,9 @@ fn obstacle(world: &mut World) -> Option<&'static str> {
     if rain.iter(world).next().is_some() {
         return Some("Switch the rain over the scene off: it is no part of the scenario.");
     }
+    if added::is_any(world) {
+        return Some("Remove the emitters that were added: they are no part of the scenario.");
+    }
     let particles = world.resource::<Particles>().effects();
     let is_strange = particles.iter().any(|effect| usize::from(effect.0) >= rows);
     is_strange.then_some("Wait until what the hose in the hand has sprayed has landed.")
@@ -208,7 +212,8 @@ pub fn show(ui: &mut egui::Ui, world: &mut World) {
     }
     let is_alone = !world.resource::<Opened>().is_model
         && !world.contains_resource::<Split>()
-        && !world.contains_resource::<Recording>();
+        && !world.contains_resource::<Recording>()
+        && !added::is_any(world);
     let is_saved = is_alone && path.join("state.ron").is_file();
     if is_saved
         && ui.button("Go on from there").on_hover_text("Of the same scenario only").clicked()

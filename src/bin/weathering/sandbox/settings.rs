@@ -21,6 +21,8 @@ pub struct Settings {
     pub zoom: f32,
     /// The panels are shown.
     pub panels: bool,
+    /// They are in pictures and sequences, too.
+    pub panels_in_pictures: bool,
     /// The maps of the selected surface are shown.
     pub maps: bool,
     /// The plots are shown.
@@ -161,6 +163,7 @@ impl Default for Settings {
         Self {
             zoom: 1.0,
             panels: true,
+            panels_in_pictures: false,
             maps: false,
             plots: false,
             charts: [true; 4],
@@ -273,6 +276,7 @@ mod tests {
         assert_eq!(Settings::read(&file), Settings::default());
         let settings = Settings {
             zoom: 2.0,
+            panels_in_pictures: true,
             plots: true,
             panel: "Weather".into(),
             tool: Tool::Probe,

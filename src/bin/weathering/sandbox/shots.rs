@@ -1,4 +1,5 @@
-//! Pictures of the scene without panels: one (F12), or one of every frame in which time has gone on (F11).
+//! Pictures of the scene: one (F12), or one of every frame in which time has gone on (F11); without panels, unless they are wanted
+//! in it.
 
 use std::path::{Path, PathBuf};
 
@@ -8,6 +9,7 @@ use bevy_egui::egui;
 use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::replay::write_png;
 
+use super::settings::Settings;
 use super::ui::{AddPanel, Note, Place, UiCamera, keyboard_is_free};
 
 /// Where pictures and saved scenes go.
@@ -88,22 +90,31 @@ fn follow_sequence(clock: Res<WeatheringClock>, mut sequence: ResMut<Sequence>, 
     sequence.tick = clock.tick();
 }
 
-/// Takes the frame that is about to be drawn, without panels.
-fn take(mut wanted: ResMut<Wanted>, mut commands: Commands, mut panels: Query<&mut Camera, With<UiCamera>>) {
+/// Takes the frame that is about to be drawn, without panels or with them.
+fn take(
+    settings: Res<Settings>,
+    sequence: Res<Sequence>,
+    mut wanted: ResMut<Wanted>,
+    mut commands: Commands,
+    mut panels: Query<&mut Camera, With<UiCamera>>,
+) {
     let path = wanted.0.take();
     for mut camera in &mut panels {
-        let is_shown = path.is_none();
+        let is_shown = path.is_none() || settings.panels_in_pictures;
         if camera.is_active != is_shown {
             camera.is_active = is_shown;
         }
     }
     let Some(path) = path else { return };
+    // Of a sequence it would be read in the pictures.
+    let is_alone = sequence.folder.is_none();
     commands.spawn(Screenshot::primary_window()).observe(
         move |captured: On<ScreenshotCaptured>, mut note: ResMut<Note>| match write_png(
             &path,
             captured.image.clone(),
         ) {
-            Ok(()) => note.tell(format!("saved {}", path.display())),
+            Ok(()) if is_alone => note.tell(format!("saved {}", path.display())),
+            Ok(()) => {}
             Err(error) => note.complain(error.to_string()),
         },
     );
@@ -112,16 +123,22 @@ fn take(mut wanted: ResMut<Wanted>, mut commands: Commands, mut panels: Query<&m
 fn show(ui: &mut egui::Ui, world: &mut World) {
     ui.heading("Pictures");
     ui.horizontal(|ui| {
-        if ui.button("Take one").on_hover_text("Without panels (F12)").clicked() {
+        if ui.button("Take one").on_hover_text("Of the scene as it is (F12)").clicked() {
             want_picture(world);
         }
         let is_running = world.resource::<Sequence>().folder.is_some();
         let label = if is_running { "End the sequence" } else { "Begin a sequence" };
-        let about = "Of every frame in which time goes on; panels are hidden meanwhile, F11 ends it";
+        let about = "Of every frame in which time goes on; F11 ends it";
         if ui.button(label).on_hover_text(about).clicked() {
             toggle_sequence(world);
         }
     });
+    let mut settings = world.resource_mut::<Settings>();
+    let mut with_panels = settings.panels_in_pictures;
+    let about = "Else they are hidden while pictures are taken";
+    if ui.checkbox(&mut with_panels, "with panels").on_hover_text(about).changed() {
+        settings.panels_in_pictures = with_panels;
+    }
     ui.small(format!("into {}", world.resource::<OutFolder>().0.display()));
     ui.separator();
     super::saving::show(ui, world);

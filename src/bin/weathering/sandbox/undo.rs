@@ -1,7 +1,7 @@
-//! Taking brush strokes back.
+//! Taking brush strokes back, and emitters that were added or removed.
 //!
 //! Before a stroke first touches a surface, what it holds is kept. Taking the stroke back puts that there again, whatever has
-//! happened on the surface since. The oldest strokes are forgotten when all of them together take too much room.
+//! happened on the surface since. What is oldest is forgotten when all together takes too much room.
 
 use std::collections::VecDeque;
 
@@ -12,11 +12,14 @@ use bevy_weathering::matter::SurfaceMatter;
 use bevy_weathering::record::Recording;
 use bevy_weathering::wetting::SurfaceWater;
 
+use super::added::Done;
 use super::record;
 use super::ui::{Note, keyboard_is_free};
 
 /// Bytes of all that is kept.
 const ROOM: usize = 256 << 20;
+/// Bytes that an emitter counts for.
+const EMITTER: usize = 1 << 10;
 
 /// Things that may be taken back, the last one first, and how large they are.
 struct Stack<T> {
@@ -60,16 +63,22 @@ struct Before {
     matter: SurfaceMatter,
 }
 
-/// Strokes that may be taken back, and the one that is being painted.
+/// Something that may be taken back.
+enum Step {
+    Stroke(Vec<Before>),
+    Emitter(Done),
+}
+
+/// What may be taken back, and the stroke that is being painted.
 #[derive(Resource)]
 pub struct Undo {
-    strokes: Stack<Vec<Before>>,
+    steps: Stack<Step>,
     current: Vec<Before>,
 }
 
 impl Default for Undo {
     fn default() -> Self {
-        Self { strokes: Stack::new(ROOM), current: Vec::new() }
+        Self { steps: Stack::new(ROOM), current: Vec::new() }
     }
 }
 
@@ -86,13 +95,19 @@ impl Undo {
         if !self.current.is_empty() {
             let stroke = std::mem::take(&mut self.current);
             let bytes = stroke.iter().map(|before| before.water.bytes() + before.matter.bytes()).sum();
-            self.strokes.push(bytes, stroke);
+            self.steps.push(bytes, Step::Stroke(stroke));
         }
     }
 
-    /// Strokes that may be taken back.
+    /// Keeps what was done to an emitter.
+    pub fn keep_emitter(&mut self, done: Done) {
+        self.end_stroke();
+        self.steps.push(EMITTER, Step::Emitter(done));
+    }
+
+    /// How much may be taken back: strokes and emitters.
     pub fn count(&self) -> usize {
-        self.strokes.entries.len()
+        self.steps.entries.len()
     }
 }
 
@@ -111,7 +126,7 @@ fn press(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
     }
 }
 
-/// Takes the last stroke back. While a session is recorded, by running it again without the stroke.
+/// Takes back what was done last. While a session is recorded, the last stroke, by running it again without the stroke.
 pub fn undo(world: &mut World) {
     if world.contains_resource::<Recording>() {
         record::take_back_stroke(world);
@@ -119,25 +134,32 @@ pub fn undo(world: &mut World) {
     }
     let mut undo = world.resource_mut::<Undo>();
     undo.end_stroke();
-    let Some(stroke) = undo.strokes.pop() else {
-        world.resource_mut::<Note>().tell("no stroke to take back");
-        return;
+    let last = undo.steps.pop();
+    let told = match last {
+        Some(Step::Stroke(stroke)) => put_back(world, &stroke),
+        Some(Step::Emitter(done)) => done.take_back(world),
+        None => "nothing to take back",
     };
+    world.resource_mut::<Note>().tell(told);
+}
+
+/// Surfaces as they were before a stroke.
+fn put_back(world: &mut World, stroke: &[Before]) -> &'static str {
     // Its last touches may still wait for a tick.
     world.resource_mut::<BrushQueue>().0.clear();
     let mut surfaces = world.query::<(&mut SurfaceWater, &mut SurfaceMatter)>();
-    for Before { surface, water, matter } in &stroke {
+    for Before { surface, water, matter } in stroke {
         if let Ok((mut there, mut beside)) = surfaces.get_mut(world, *surface) {
             there.put_back(&mut beside, water, matter);
         }
     }
-    world.resource_mut::<Note>().tell("took a stroke back");
+    "took a stroke back"
 }
 
 /// What was painted before the scene began anew is no more.
 fn forget(clock: Res<WeatheringClock>, mut undo: ResMut<Undo>, mut last: Local<u32>) {
     if clock.tick() < *last {
-        undo.strokes.clear();
+        undo.steps.clear();
         undo.current.clear();
     }
     *last = clock.tick();

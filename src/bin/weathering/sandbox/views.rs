@@ -11,6 +11,7 @@ use bevy_weathering::collision::{CollisionScene, MeshBvh, MeshTriangles, Surface
 use bevy_weathering::emitter::{Emitter, EmitterShape};
 use bevy_weathering::weather::Weather;
 
+use super::added::Removed;
 use super::probe::Probed;
 use super::selection::Selected;
 use super::settings::{Settings, Tool};
@@ -110,7 +111,11 @@ fn find_seams(triangles: &MeshTriangles) -> Vec<[Vec3; 2]> {
         .collect()
 }
 
-fn draw_emitters(settings: Res<Settings>, emitters: Query<(&Emitter, &GlobalTransform)>, mut gizmos: Gizmos) {
+fn draw_emitters(
+    settings: Res<Settings>,
+    emitters: Query<(&Emitter, &GlobalTransform), Without<Removed>>,
+    mut gizmos: Gizmos,
+) {
     if !settings.views.emitters {
         return;
     }
