@@ -168,7 +168,8 @@ impl Session {
     }
 }
 
-fn app(loaded: LoadedScenario) -> App {
+/// A scenario without a renderer.
+pub fn app(loaded: LoadedScenario) -> App {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default(), MeshPlugin))
         .add_plugins(WeatheringPlugins.build().disable::<GpuOverlayPlugin>())
@@ -179,7 +180,7 @@ fn app(loaded: LoadedScenario) -> App {
 }
 
 /// Until the scene is there.
-fn wait(app: &mut App) {
+pub fn wait(app: &mut App) {
     app.finish();
     app.cleanup();
     for _ in 0..10_000 {

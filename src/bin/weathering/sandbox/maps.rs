@@ -4,10 +4,11 @@ use std::time::Instant;
 
 use bevy::prelude::*;
 use bevy_egui::{EguiTextureHandle, EguiUserTextures, egui};
+use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::emitter::Source;
 use bevy_weathering::matter::SurfaceMatter;
 use bevy_weathering::overlay::Overlays;
-use bevy_weathering::wetting::{SurfaceWater, TexelGeometry, WetGeometry, Wetness, WetnessQuery};
+use bevy_weathering::wetting::{Exposure, SurfaceWater, TexelGeometry, WetGeometry, Wetness, WetnessQuery};
 
 use super::selection::{Selected, choose_surface};
 use super::settings::Settings;
@@ -26,25 +27,31 @@ enum Channel {
     Film,
     Absorbed,
     Saturation,
+    Since,
     Source,
     Dust,
     Mud,
     Snow,
+    Air,
+    Sun,
     Colour,
     Gloss,
     Normal,
 }
 
 impl Channel {
-    const ALL: [(Self, &'static str); 11] = [
+    const ALL: [(Self, &'static str); 14] = [
         (Self::Wetness, "looks wet"),
         (Self::Film, "film"),
         (Self::Absorbed, "absorbed"),
         (Self::Saturation, "pores full"),
+        (Self::Since, "wet for"),
         (Self::Source, "source"),
         (Self::Dust, "dust"),
         (Self::Mud, "mud"),
         (Self::Snow, "snow"),
+        (Self::Air, "air"),
+        (Self::Sun, "sun"),
         (Self::Colour, "colour"),
         (Self::Gloss, "gloss"),
         (Self::Normal, "normal"),
@@ -60,9 +67,20 @@ impl Channel {
         }
     }
 
-    /// Whether it is a part of a whole, and not mm.
+    /// Whether it is a part of a whole.
     fn is_part(self) -> bool {
-        matches!(self, Self::Wetness | Self::Saturation)
+        matches!(self, Self::Wetness | Self::Saturation | Self::Sun)
+    }
+
+    /// Behind its numbers.
+    fn unit(self) -> &'static str {
+        match self {
+            Self::Since => " s",
+            // Of what an even surface in the open gets; more on what stands out.
+            Self::Air => "",
+            _ if self.is_part() => "",
+            _ => " mm",
+        }
     }
 
     fn of_water(self, wetness: &Wetness) -> f32 {
@@ -100,8 +118,9 @@ pub fn plugin(app: &mut App) {
 fn sample(
     settings: Res<Settings>,
     selected: Res<Selected>,
+    clock: Res<WeatheringClock>,
     wetness: WetnessQuery,
-    surfaces: Query<(&SurfaceWater, &WetGeometry, Option<&SurfaceMatter>)>,
+    surfaces: Query<(&SurfaceWater, &WetGeometry, Option<&SurfaceMatter>, Option<&Exposure>)>,
     mut view: ResMut<MapView>,
 ) {
     let Some(surface) = selected.0.filter(|_| settings.maps && settings.panels) else { return };
@@ -112,7 +131,7 @@ fn sample(
     if is_fresh || matches!(channel, Channel::Colour | Channel::Gloss | Channel::Normal) {
         return;
     }
-    let Ok((water, geometry, matter)) = surfaces.get(surface) else { return };
+    let Ok((water, geometry, matter, exposure)) = surfaces.get(surface) else { return };
     let of_matter = |uv: Vec2| {
         let (matter, size) = (matter?, water.size());
         let texel = texel_under(size, uv);
@@ -131,6 +150,19 @@ fn sample(
         let uv = Vec2::new(middle(index % SIDE), middle(index / SIDE));
         match channel {
             Channel::Dust | Channel::Mud | Channel::Snow => of_matter(uv).unwrap_or(0.0),
+            Channel::Since => {
+                let here = wetness.at_uv(surface, uv).unwrap_or_default();
+                let origin = texel_at(water.size(), &geometry.0, uv).and_then(|texel| water.origin(texel));
+                let is_wet = here.film_mm + here.absorbed_mm > 0.0;
+                origin.filter(|_| is_wet).map_or(0.0, |origin| seconds_since(&clock, origin.since))
+            }
+            Channel::Air | Channel::Sun => {
+                let texel = texel_at(water.size(), &geometry.0, uv);
+                let parts = exposure.zip(texel).and_then(|(exposure, texel)| exposure.get(texel));
+                // What is used while it is not known.
+                let (air, sun) = parts.unwrap_or((1.0, 0.0));
+                (if channel == Channel::Air { air } else { sun }) as f32
+            }
             Channel::Source => {
                 let origin = texel_at(water.size(), &geometry.0, uv).and_then(|texel| water.origin(texel));
                 f32::from(origin.unwrap_or_default().source.0)
@@ -142,6 +174,11 @@ fn sample(
     view.values.extend((0..SIDE * SIDE).map(value));
     view.read = Some((surface, channel, Instant::now()));
     view.is_new = true;
+}
+
+/// Seconds of weather from a tick until now.
+fn seconds_since(clock: &WeatheringClock, tick: u32) -> f32 {
+    (f64::from(clock.tick().saturating_sub(tick)) / f64::from(clock.hz())) as f32
 }
 
 /// The texel below a uv of 0..=1, of a map with so many along each side.
@@ -224,7 +261,7 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
         sources::legend(ui, world);
         return;
     }
-    let unit = if channel.is_part() { "" } else { " mm" };
+    let unit = channel.unit();
     ui.small(format!("white is {most:.3}{unit}"));
     if let Some((part, value)) = hovered {
         ui.label(format!("uv {:.3} {:.3}: {value:.4}{unit}", part.x, part.y));
@@ -244,5 +281,13 @@ mod tests {
         assert_eq!(most(&[0.0, 3.0, 2.0], Channel::Film), 3.0);
         assert_eq!(most(&[0.0, 0.2], Channel::Wetness), 1.0);
         assert!(most(&[], Channel::Dust) > 0.0);
+    }
+
+    #[test]
+    fn every_map_has_a_name_and_a_unit() {
+        let names: std::collections::BTreeSet<_> = Channel::ALL.iter().map(|(_, name)| name).collect();
+        assert_eq!(names.len(), Channel::ALL.len());
+        let units = [Channel::Since, Channel::Film, Channel::Sun].map(Channel::unit);
+        assert_eq!(units, [" s", " mm", ""]);
     }
 }
