@@ -20,6 +20,9 @@ const SIDE: usize = 128;
 /// Seconds between two readings.
 const EVERY: f32 = 0.5;
 
+/// In place of the source of water where there is none.
+const DRY: f32 = -1.0;
+
 /// What is shown of a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Channel {
@@ -67,6 +70,15 @@ impl Channel {
         }
     }
 
+    /// What red, green and blue of a painted map say.
+    fn colours(self) -> [&'static str; 3] {
+        match self {
+            Self::Gloss => ["reflectance", "smoothness", "nothing"],
+            Self::Normal => ["slope along u", "slope along v", "nothing"],
+            _ => ["red", "green", "blue"],
+        }
+    }
+
     /// Whether it is a part of a whole.
     fn is_part(self) -> bool {
         matches!(self, Self::Wetness | Self::Saturation | Self::Sun)
@@ -97,6 +109,8 @@ impl Channel {
 #[derive(Resource)]
 struct MapView {
     channel: Channel,
+    /// Of a painted map, whether red, green and blue are shown.
+    shown: [bool; 3],
     /// Row by row from v = 0; empty until it has been read.
     values: Vec<f32>,
     /// Of what, and when.
@@ -107,7 +121,14 @@ struct MapView {
 
 impl Default for MapView {
     fn default() -> Self {
-        Self { channel: Channel::Wetness, values: Vec::new(), read: None, is_new: false, texture: None }
+        Self {
+            channel: Channel::Wetness,
+            shown: [true; 3],
+            values: Vec::new(),
+            read: None,
+            is_new: false,
+            texture: None,
+        }
     }
 }
 
@@ -145,17 +166,17 @@ fn sample(
         let is_measured = geometry.0.size() == size;
         is_measured.then(|| (f64::from(units) * geometry.0.unit_mm(water.units(), texel)) as f32)
     };
+    let wet_from = |uv: Vec2| {
+        let here = wetness.at_uv(surface, uv)?;
+        let texel = texel_at(water.size(), &geometry.0, uv)?;
+        (here.film_mm + here.absorbed_mm > 0.0).then(|| water.origin(texel).unwrap_or_default())
+    };
     let middle = |index: usize| (index as f32 + 0.5) / SIDE as f32;
     let value = |index: usize| {
         let uv = Vec2::new(middle(index % SIDE), middle(index / SIDE));
         match channel {
             Channel::Dust | Channel::Mud | Channel::Snow => of_matter(uv).unwrap_or(0.0),
-            Channel::Since => {
-                let here = wetness.at_uv(surface, uv).unwrap_or_default();
-                let origin = texel_at(water.size(), &geometry.0, uv).and_then(|texel| water.origin(texel));
-                let is_wet = here.film_mm + here.absorbed_mm > 0.0;
-                origin.filter(|_| is_wet).map_or(0.0, |origin| seconds_since(&clock, origin.since))
-            }
+            Channel::Since => wet_from(uv).map_or(0.0, |origin| seconds_since(&clock, origin.since)),
             Channel::Air | Channel::Sun => {
                 let texel = texel_at(water.size(), &geometry.0, uv);
                 let parts = exposure.zip(texel).and_then(|(exposure, texel)| exposure.get(texel));
@@ -163,10 +184,7 @@ fn sample(
                 let (air, sun) = parts.unwrap_or((1.0, 0.0));
                 (if channel == Channel::Air { air } else { sun }) as f32
             }
-            Channel::Source => {
-                let origin = texel_at(water.size(), &geometry.0, uv).and_then(|texel| water.origin(texel));
-                f32::from(origin.unwrap_or_default().source.0)
-            }
+            Channel::Source => wet_from(uv).map_or(DRY, |origin| f32::from(origin.source.0)),
             _ => wetness.at_uv(surface, uv).map_or(0.0, |wetness| channel.of_water(&wetness)),
         }
     };
@@ -198,6 +216,12 @@ fn most(values: &[f32], channel: Channel) -> f32 {
     if channel.is_part() { 1.0 } else { values.iter().copied().fold(1e-3, f32::max) }
 }
 
+/// What leaves only some of red, green and blue of a picture.
+fn tint([red, green, blue]: [bool; 3]) -> egui::Color32 {
+    let part = |is_shown: bool| if is_shown { 255 } else { 0 };
+    egui::Color32::from_rgb(part(red), part(green), part(blue))
+}
+
 /// From black over blue to white.
 pub fn colour(part: f32) -> egui::Color32 {
     let byte = |from: f32, to: f32| (((part - from) / (to - from)).clamp(0.0, 1.0) * 255.0) as u8;
@@ -221,10 +245,17 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     let Some(overlays) = world.get::<Overlays>(surface) else { return };
     if let Some(image) = channel.image(overlays).cloned() {
         ui.small(format!("{0} x {0} texels, premultiplied", overlays.size));
+        let mut shown = world.resource::<MapView>().shown;
+        ui.horizontal_wrapped(|ui| {
+            for (is_shown, name) in shown.iter_mut().zip(channel.colours()) {
+                ui.toggle_value(is_shown, name);
+            }
+        });
+        world.resource_mut::<MapView>().shown = shown;
         // Does not keep the map of a surface that has gone.
         let handle = EguiTextureHandle::Weak(image.id());
         let texture = world.resource_mut::<EguiUserTextures>().add_image(handle);
-        ui.add(egui::Image::new((texture, size)).bg_fill(egui::Color32::BLACK));
+        ui.add(egui::Image::new((texture, size)).bg_fill(egui::Color32::BLACK).tint(tint(shown)));
         return;
     }
     let mut view = world.resource_mut::<MapView>();
@@ -235,7 +266,9 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     let most = most(&view.values, channel);
     if view.is_new || view.texture.is_none() {
         view.is_new = false;
-        let of_source = |value: f32| sources::colour(Source(value as u16));
+        let of_source = |value: f32| {
+            if value == DRY { egui::Color32::BLACK } else { sources::colour(Source(value as u16)) }
+        };
         let is_source = channel == Channel::Source;
         let pixel = |value: &f32| if is_source { of_source(*value) } else { colour(value / most) };
         let pixels = view.values.iter().map(pixel).collect();
@@ -255,7 +288,7 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     });
     if channel == Channel::Source {
         if let Some((part, value)) = hovered {
-            let name = sources::name(world, Source(value as u16));
+            let name = if value == DRY { "dry".into() } else { sources::name(world, Source(value as u16)) };
             ui.label(format!("uv {:.3} {:.3}: {name}", part.x, part.y));
         }
         sources::legend(ui, world);
@@ -289,5 +322,7 @@ mod tests {
         assert_eq!(names.len(), Channel::ALL.len());
         let units = [Channel::Since, Channel::Film, Channel::Sun].map(Channel::unit);
         assert_eq!(units, [" s", " mm", ""]);
+        assert_eq!(tint([true; 3]), egui::Color32::WHITE);
+        assert_eq!(tint([false, true, false]).to_array(), [0, 255, 0, 255]);
     }
 }
