@@ -168,8 +168,7 @@ impl Session {
     }
 }
 
-/// A scenario without a renderer.
-pub fn app(loaded: LoadedScenario) -> App {
+fn app(loaded: LoadedScenario) -> App {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default(), MeshPlugin))
         .add_plugins(WeatheringPlugins.build().disable::<GpuOverlayPlugin>())
@@ -180,7 +179,7 @@ pub fn app(loaded: LoadedScenario) -> App {
 }
 
 /// Until the scene is there.
-pub fn wait(app: &mut App) {
+fn wait(app: &mut App) {
     app.finish();
     app.cleanup();
     for _ in 0..10_000 {
@@ -354,4 +353,11 @@ fn a_place_that_cannot_be_written_is_an_error_and_the_recording_goes_on() {
     fs::write(folder.join("tap.effect.ron"), TAP).unwrap();
     let digest = session.digest();
     assert_eq!(replayed(&file), digest);
+}
+
+/// A scenario that nobody records, without a renderer, when it is there.
+pub fn ready(loaded: LoadedScenario) -> App {
+    let mut app = app(loaded);
+    wait(&mut app);
+    app
 }

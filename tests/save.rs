@@ -11,7 +11,7 @@ use bevy_weathering::save::SavedScene;
 use bevy_weathering::scenario::{Scenario, ScenarioSurface};
 use serde_json::Value;
 
-use super::record::{app, wait};
+use super::record::ready;
 use super::replay::{files_below, number, read_report, replay, run};
 
 /// Ten minutes of rain on a roof over a wall and a floor, in wind, with sun.
@@ -143,14 +143,9 @@ fn floor(world: &mut World) -> Entity {
 fn what_somebody_has_made_of_a_surface_is_kept_if_it_is_asked_for() {
     let folder = tempfile::tempdir().unwrap();
     let scenario = Scenario::load(&ten_minutes(folder.path())).unwrap();
-    let ready = || {
-        let mut app = app(scenario.clone());
-        wait(&mut app);
-        app
-    };
     let porous = PorousMaterial { sorptivity: 0.7, capacity_mm: 3.0, ..PorousMaterial::CONCRETE };
     let standing = StandingWater { levelling_mm: 0.9, ..default() };
-    let mut edited = ready();
+    let mut edited = ready(scenario.clone());
     let surface = floor(edited.world_mut());
     edited.world_mut().entity_mut(surface).insert((porous, standing));
     edited.insert_resource(TimeUpdateStrategy::FixedTimesteps(20));
@@ -161,7 +156,7 @@ fn what_somebody_has_made_of_a_surface_is_kept_if_it_is_asked_for() {
     let to = folder.path().join("kept");
     for (scene, is_kept) in [(plain.clone(), false), (plain.with_materials(world), true)] {
         scene.write(&to).unwrap();
-        let mut other = ready();
+        let mut other = ready(scenario.clone());
         let world = other.world_mut();
         SavedScene::read(&to).unwrap().restore(world, &scenario, &to).unwrap();
         let surface = floor(world);
@@ -173,7 +168,7 @@ fn what_somebody_has_made_of_a_surface_is_kept_if_it_is_asked_for() {
     let text = fs::read_to_string(&state).unwrap();
     assert!(text.contains("levelling_mm: 0.9"), "{text}");
     fs::write(&state, text.replace("levelling_mm: 0.9", "levelling_mm: -1.0")).unwrap();
-    let mut other = ready();
+    let mut other = ready(scenario.clone());
     let refused = SavedScene::read(&to).unwrap().restore(other.world_mut(), &scenario, &to).unwrap_err();
     assert!(refused.to_string().contains("materials of floor: levelling_mm"), "{refused}");
 }
