@@ -27,6 +27,7 @@ const KEYS: &[(&str, &str)] = &[
     ("R", "start over"),
     ("U", "hide panels, show them"),
     ("M, P", "maps, plots"),
+    ("PageUp PageDown", "the panel before, after"),
     ("V", "what surfaces show: look, wetness, film, saturation, source"),
     ("X", "export the scene as it is"),
     ("F9", "record a session; write it and end"),
