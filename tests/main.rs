@@ -120,6 +120,8 @@ mod window {
     mod leave;
     /// More particles than the machine can do.
     mod overload;
+    /// What panels look like.
+    mod panels;
     /// A virtual screen, and a program on it.
     mod screen;
     /// The first picture, and files that change.

@@ -313,6 +313,34 @@ fn one_that_fails_does_not_stop_the_others() {
 }
 
 #[test]
+fn what_is_not_as_expected_is_done_all_the_same_and_told_each_time() {
+    let farm = Farm::new(&["a"]);
+    let expecting = |above: &str| {
+        let events = format!(
+            "events: [(at: 1.0, what: Expect(quantity: WaterMl, surface: \"ground\", above: {above}))],\n    emitters: ["
+        );
+        assert_eq!(TAP.matches("emitters: [").count(), 1);
+        TAP.replace("emitters: [", &events)
+    };
+    farm.write("scenarios/odd.ron", &expecting("1000.0"));
+    let first = farm.run(&["a", "odd"], "");
+    assert_eq!(first.code, Some(1), "{}", first.stderr);
+    assert_eq!(became(&first), [("a", "ran"), ("odd", "ran")]);
+    assert!(first.stdout.contains("1 not as expected"), "{}", first.stdout);
+    assert!(first.stderr.contains("odd: not as expected: events[0]"), "{}", first.stderr);
+    let again = farm.run(&["a", "odd"], "--jobs 2");
+    assert_eq!(again.code, Some(1), "{}", again.stderr);
+    assert_eq!(became(&again), [("a", "skipped"), ("odd", "skipped")]);
+    // Once it is as expected, all is well.
+    farm.write("scenarios/odd.ron", &expecting("0.0"));
+    farm.run(&["a", "odd"], "").assert_success();
+    // What fails weighs more.
+    farm.write("scenarios/odd.ron", &expecting("1000.0"));
+    farm.write("scenarios/torn.ron", "(seconds: 1.0");
+    assert_eq!(farm.run(&["odd", "torn"], "").code, Some(2));
+}
+
+#[test]
 fn a_task_of_an_array_runs_its_own_scenario() {
     let farm = Farm::new(&["a", "b", "c"]);
     let names = ["a", "b", "c"];

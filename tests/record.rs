@@ -367,3 +367,10 @@ fn a_place_that_cannot_be_written_is_an_error_and_the_recording_goes_on() {
     let digest = session.digest();
     assert_eq!(replayed(&file), digest);
 }
+
+/// A scenario that nobody records, without a renderer, when it is there.
+pub fn ready(loaded: LoadedScenario) -> App {
+    let mut app = app(loaded);
+    wait(&mut app);
+    app
+}

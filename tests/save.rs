@@ -3,8 +3,15 @@
 use std::fs;
 use std::path::Path;
 
+use bevy::prelude::*;
+use bevy::time::TimeUpdateStrategy;
+use bevy_weathering::material::{PorousMaterial, StandingWater};
+use bevy_weathering::record::colors_at_hand;
+use bevy_weathering::save::SavedScene;
+use bevy_weathering::scenario::{Scenario, ScenarioSurface};
 use serde_json::Value;
 
+use super::record::ready;
 use super::replay::{files_below, number, read_report, replay, run};
 
 /// Ten minutes of rain on a roof over a wall and a floor, in wind, with sun.
@@ -125,6 +132,45 @@ fn a_run_that_was_saved_goes_on_to_the_same_digest() {
     for name in names {
         assert_eq!(fs::read(kept.join(&name)).unwrap(), fs::read(again.join(&name)).unwrap(), "{name}");
     }
+}
+
+fn floor(world: &mut World) -> Entity {
+    let mut surfaces = world.query::<(Entity, &ScenarioSurface)>();
+    surfaces.iter(world).find(|(_, surface)| surface.name == "floor").unwrap().0
+}
+
+#[test]
+fn what_somebody_has_made_of_a_surface_is_kept_if_it_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = Scenario::load(&ten_minutes(folder.path())).unwrap();
+    let porous = PorousMaterial { sorptivity: 0.7, capacity_mm: 3.0, ..PorousMaterial::CONCRETE };
+    let standing = StandingWater { levelling_mm: 0.9, ..default() };
+    let mut edited = ready(scenario.clone());
+    let surface = floor(edited.world_mut());
+    edited.world_mut().entity_mut(surface).insert((porous, standing));
+    edited.insert_resource(TimeUpdateStrategy::FixedTimesteps(20));
+    edited.update();
+    let world = edited.world_mut();
+    let colors = colors_at_hand(world).unwrap();
+    let plain = SavedScene::capture(world, &scenario, colors);
+    let to = folder.path().join("kept");
+    for (scene, is_kept) in [(plain.clone(), false), (plain.with_materials(world), true)] {
+        scene.write(&to).unwrap();
+        let mut other = ready(scenario.clone());
+        let world = other.world_mut();
+        SavedScene::read(&to).unwrap().restore(world, &scenario, &to).unwrap();
+        let surface = floor(world);
+        assert_eq!(world.get::<PorousMaterial>(surface) == Some(&porous), is_kept);
+        assert_eq!(world.get::<StandingWater>(surface) == Some(&standing), is_kept);
+    }
+    // What no material can be is refused.
+    let state = to.join("state.ron");
+    let text = fs::read_to_string(&state).unwrap();
+    assert!(text.contains("levelling_mm: 0.9"), "{text}");
+    fs::write(&state, text.replace("levelling_mm: 0.9", "levelling_mm: -1.0")).unwrap();
+    let mut other = ready(scenario.clone());
+    let refused = SavedScene::read(&to).unwrap().restore(other.world_mut(), &scenario, &to).unwrap_err();
+    assert!(refused.to_string().contains("materials of floor: levelling_mm"), "{refused}");
 }
 
 #[test]

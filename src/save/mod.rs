@@ -7,7 +7,7 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `state.ron` | version, time, weather, emitters, particles in flight, accounts |
+//! | `state.ron` | version, time, weather, emitters, particles in flight, accounts; materials, if they were [asked for](SavedScene::with_materials) |
 //! | `<surface>_film.png`, `_pores.png`, `_since.png` | a texel's words, the lowest byte in red, the highest in alpha |
 //! | `<surface>_look.png` | how wet it looked, reserve, how much of its film was seen, nearness to a rim |
 //! | `<surface>_efflorescence.png`, `_tide.png` | bits of `f32`, as above; if the material leaves marks |
@@ -28,6 +28,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::clock::WeatheringClock;
 use crate::emitter::{EmissionSeed, Emitter, EmitterState, NewParticles};
+use crate::material::{PorousMaterial, StandingWater};
 use crate::matter::{MatterLedger, SurfaceMatter, bind_dried};
 use crate::overlay::{MapLoss, MapSize, SurfaceTotals, SurfaceTraces, TILE_SIZE, Wrap};
 use crate::particle::{ParticleCounts, Particles, SavedParticle, WaterCounts};
@@ -98,6 +99,9 @@ pub(super) struct SurfaceState {
     /// What was lost with maps.
     #[serde(default)]
     pub(super) loss: MapLoss,
+    /// What it is made of, and water that stands on it; left out where that is for the scenario to say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) materials: Option<(PorousMaterial, StandingWater)>,
 }
 
 /// The maps of a surface.
@@ -160,6 +164,7 @@ impl SavedScene {
                 totals: of(entity),
                 traces: world.get::<SurfaceTraces>(entity).copied().unwrap_or_default(),
                 loss: world.get::<MapLoss>(entity).copied().unwrap_or_default(),
+                materials: None,
             });
             surfaces.push(SavedSurface { water, matter, colors });
         }
@@ -183,6 +188,19 @@ impl SavedScene {
             surfaces: states,
         };
         Self { state, surfaces }
+    }
+
+    /// Keeps what surfaces are made of, too, as it is now. A scenario says that itself, and when it changes; this is for apps in
+    /// which somebody may have changed it.
+    #[must_use]
+    pub fn with_materials(mut self, world: &mut World) -> Self {
+        let order = surfaces_in_order(world);
+        for (state, (entity, _)) in self.state.surfaces.iter_mut().zip(order) {
+            let porous = world.get::<PorousMaterial>(entity).copied().unwrap_or_default();
+            let water = world.get::<StandingWater>(entity).copied().unwrap_or_default();
+            state.materials = Some((porous, water));
+        }
+        self
     }
 
     /// That a scene can be saved into this folder: better before a long run than after it. Makes the folder that it lies

@@ -19,7 +19,7 @@ use crate::overlay::{
 use crate::particle::{ParticleCounts, Particles};
 use crate::scenario::{Digest, LoadedScenario, check_weather, rewind};
 use crate::weather::DryingClock;
-use crate::wetting::SurfaceWater;
+use crate::wetting::{SurfaceWater, put_matter};
 
 impl SavedScene {
     /// Puts the state into a world whose scenario is ready and has run no tick. `folder` is for messages.
@@ -101,6 +101,14 @@ impl SavedScene {
             return Err(value(&path, "a particle", format!("number {}", particle.sequence), expected));
         }
 
+        for surface in &state.surfaces {
+            let Some((porous, water)) = &surface.materials else { continue };
+            if let Err(wrong) = porous.validate().and_then(|()| water.validate()) {
+                let field = format!("materials of {}: {}", surface.name, wrong.field);
+                return Err(value(&path, &field, wrong.value, format!("{} to {}", wrong.least, wrong.most)));
+            }
+        }
+
         rewind(world, state.tick);
         world.insert_resource(drying);
         world.insert_resource(state.weather);
@@ -120,6 +128,11 @@ impl SavedScene {
         let waiting = state.waiting.iter().map(|&saved| saved.into()).collect();
         world.resource_mut::<NewParticles>().restore(waiting, state.next_sequence);
         for (index, (entity, _)) in surfaces.into_iter().enumerate() {
+            if let Some((porous, water)) = state.surfaces[index].materials {
+                // What it holds is of this matter, and not yet to be settled as of another.
+                put_matter(world, entity, porous);
+                world.entity_mut(entity).insert(water);
+            }
             self.restore_surface(world, index, entity);
         }
         Ok(())

@@ -48,6 +48,12 @@ impl Exposure {
         (f64::from(air) / 128.0, f64::from(sun) / 255.0)
     }
 
+    /// The same; `None` for a texel of another, larger map.
+    pub fn get(&self, texel: u32) -> Option<(f64, f64)> {
+        let (air, sun) = (self.air.get(texel as usize)?, self.sun.get(texel as usize)?);
+        Some((f64::from(*air) / 128.0, f64::from(*sun) / 255.0))
+    }
+
     /// The same as it is stored: 128 and 255 are 1.
     pub fn bytes_at(&self, texel: u32) -> [u8; 2] {
         [self.air[texel as usize], self.sun[texel as usize]]

@@ -92,3 +92,39 @@ fn keys_pause_start_over_take_pictures_and_leave() {
     let status = sandbox.end();
     assert!(status.success(), "{status}");
 }
+
+#[test]
+fn a_brush_wets_what_is_under_the_mouse_and_a_stroke_is_taken_back() {
+    let Some(screen) = Screen::start() else { return };
+    // A hose that is shut: nothing is wet but by hand.
+    assert_eq!(SCENARIO.matches("rate: 500.0").count(), 1);
+    let scenery = Scenery::new(&SCENARIO.replace("rate: 500.0", "rate: 0.0"));
+    let mut sandbox = Sandbox::start(&screen, &scenery);
+    // Water of before the first tick would be of no time.
+    let dry = wait_for("a picture that stands still", || {
+        let picture = sandbox.picture();
+        (floor_part(&picture) > 0.4 && picture.as_raw() == sandbox.picture().as_raw()).then_some(picture)
+    });
+    sandbox.key("space");
+    sandbox.state("paused");
+    sandbox.key("1");
+    // A frame may take longer than a short stroke: it is painted until it is seen.
+    let darkest = wait_for("the stroke to be seen", || {
+        sandbox.xdotool(&["mousemove", "560", "330", "mousedown", "1"]);
+        for _ in 0..6 {
+            std::thread::sleep(Duration::from_millis(250));
+            sandbox.xdotool(&["mousemove_relative", "12", "4"]);
+        }
+        sandbox.xdotool(&["mouseup", "1"]);
+        let part = darker_part(&sandbox.picture(), &dry);
+        (part > 0.0005).then_some(part)
+    });
+    // It may have taken several.
+    wait_for("the strokes to be gone", || {
+        sandbox.xdotool(&["key", "ctrl+z"]);
+        (darker_part(&sandbox.picture(), &dry) < 0.1 * darkest).then_some(())
+    });
+    sandbox.key("Escape");
+    let status = sandbox.end();
+    assert!(status.success(), "{status}");
+}

@@ -79,13 +79,30 @@ impl Screen {
         String::from_utf8_lossy(&output.expect("xdotool runs").stdout).trim().to_owned()
     }
 
+    /// What the server keeps of the screen: the words of its header, and rows of blue, green, red and a byte without a meaning.
+    fn dump(&self) -> (Vec<usize>, Vec<u8>) {
+        let mut dump = fs::read(self.memory.path().join("Xvfb_screen0")).unwrap();
+        let words = dump.as_chunks::<4>().0.iter().take(25);
+        let header: Vec<usize> = words.map(|word| u32::from_be_bytes(*word) as usize).collect();
+        // Behind the header lie the colours that it announces.
+        dump.drain(..header[0] + 12 * header[19]);
+        (header, dump)
+    }
+
+    /// The screen as it is, panels and all.
+    pub fn picture(&self) -> image::RgbImage {
+        let (header, bytes) = self.dump();
+        let (width, height, row) = (header[4], header[5], header[12]);
+        image::RgbImage::from_fn(width as u32, height as u32, |x, y| {
+            let at = y as usize * row + 4 * x as usize;
+            image::Rgb([bytes[at + 2], bytes[at + 1], bytes[at]])
+        })
+    }
+
     /// What is on the screen.
     pub fn shares(&self) -> Shares {
-        let dump = fs::read(self.memory.path().join("Xvfb_screen0")).unwrap();
-        let words = dump.as_chunks::<4>().0;
-        let header = |index: usize| u32::from_be_bytes(words[index]) as usize;
-        // Behind the header and the colours that it announces: blue, green, red and a byte without a meaning.
-        let pixels = dump[header(0) + 12 * header(19)..].as_chunks::<4>().0;
+        let (_, bytes) = self.dump();
+        let pixels = bytes.as_chunks::<4>().0;
         let part = |wanted: [u8; 3]| {
             let count = pixels.iter().filter(|pixel| pixel[..3] == wanted).count();
             count as f64 / pixels.len() as f64
@@ -146,6 +163,13 @@ impl Scenery {
     /// Pictures and saved scenes.
     pub fn out(&self) -> PathBuf {
         self.folder.path().join("out")
+    }
+
+    /// What the program is to remember of a time before.
+    pub fn remember(&self, settings: &str) {
+        let folder = self.folder.path().join("config/bevy_weathering");
+        fs::create_dir_all(&folder).unwrap();
+        fs::write(folder.join("settings.ron"), settings).unwrap();
     }
 
     /// What the program said since it was started last.

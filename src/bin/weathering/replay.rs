@@ -18,7 +18,7 @@ pub fn run(arguments: &ReplayArgs) -> Result<ExitCode, Box<dyn Error>> {
     tracing_subscriber::fmt().with_max_level(bevy::log::Level::WARN).with_writer(std::io::stderr).init();
     match arguments.files.as_slice() {
         [file] if !arguments.is_batch() => run_one(file, arguments),
-        _ => batch::run(arguments).map(|()| ExitCode::SUCCESS),
+        _ => batch::run(arguments),
     }
 }
 

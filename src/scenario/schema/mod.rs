@@ -1,6 +1,8 @@
 //! What a scenario file may say: a [`ScenarioPart`], which with all that it includes makes a [`Scenario`]. Every struct
 //! refuses fields it does not know.
 
+#[cfg(test)]
+mod checks;
 mod emitter;
 mod part;
 mod surface;

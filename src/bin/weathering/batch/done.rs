@@ -29,26 +29,42 @@ pub struct Done {
     digest: String,
 }
 
-/// The one field of `report.json` that is looked at.
+/// What a run that came to its end has told in `report.json`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Finished {
+    pub digest: String,
+    /// Expectations that did not hold.
+    pub unmet: usize,
+}
+
+/// The fields of `report.json` that are looked at.
 #[derive(Deserialize)]
-struct ReportDigest {
+struct Reported {
     digest: String,
+    #[serde(default)]
+    expectations: Vec<Expected>,
+}
+
+/// An expectation, of which only the end counts.
+#[derive(Deserialize)]
+struct Expected {
+    holds: Option<bool>,
 }
 
 impl Done {
-    /// The digest of a folder in which this request is done. That its report is there and of the same digest is checked, too.
-    pub fn find(folder: &Path, request: &Request) -> Option<String> {
+    /// What came of a folder in which this request is done. That its report is there and of the same digest is checked, too.
+    pub fn find(folder: &Path, request: &Request) -> Option<Finished> {
         let done: Self = serde_json::from_slice(&fs::read(folder.join(DONE_FILE)).ok()?).ok()?;
-        let reported = reported_digest(folder).ok()?;
-        (done.request == *request && done.digest == reported).then_some(reported)
+        let reported = reported(folder).ok()?;
+        (done.request == *request && done.digest == reported.digest).then_some(reported)
     }
 
-    /// Marks a folder as done; tells the digest of its report.
-    pub fn write(folder: &Path, request: Request) -> Result<String, Box<dyn Error>> {
-        let digest = reported_digest(folder)?;
-        let done = Self { request, digest: digest.clone() };
+    /// Marks a folder as done, whatever came of expectations; tells what its report does.
+    pub fn write(folder: &Path, request: Request) -> Result<Finished, Box<dyn Error>> {
+        let reported = reported(folder)?;
+        let done = Self { request, digest: reported.digest.clone() };
         write_atomic(&folder.join(DONE_FILE), &serde_json::to_vec_pretty(&done)?)?;
-        Ok(digest)
+        Ok(reported)
     }
 
     /// It is not done, or no longer.
@@ -63,12 +79,13 @@ impl Done {
     }
 }
 
-fn reported_digest(folder: &Path) -> Result<String, Box<dyn Error>> {
+fn reported(folder: &Path) -> Result<Finished, Box<dyn Error>> {
     let path = folder.join("report.json");
     let bytes = fs::read(&path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-    let report: ReportDigest =
+    let Reported { digest, expectations } =
         serde_json::from_slice(&bytes).map_err(|error| format!("{}: {error}", path.display()))?;
-    Ok(report.digest)
+    let unmet = expectations.iter().filter(|expected| expected.holds == Some(false)).count();
+    Ok(Finished { digest, unmet })
 }
 
 #[cfg(test)]
@@ -95,8 +112,9 @@ mod tests {
         };
         report("d1");
         assert_eq!(Done::find(folder, &request()), None);
-        assert_eq!(Done::write(folder, request()).unwrap(), "d1");
-        assert_eq!(Done::find(folder, &request()).as_deref(), Some("d1"));
+        let finished = Finished { digest: "d1".into(), unmet: 0 };
+        assert_eq!(Done::write(folder, request()).unwrap(), finished);
+        assert_eq!(Done::find(folder, &request()), Some(finished));
         let others = [
             Request { scenario: "snow".into(), ..request() },
             Request { inputs: "x".into(), ..request() },
@@ -107,6 +125,17 @@ mod tests {
         // Somebody else has run something into it.
         report("d2");
         assert_eq!(Done::find(folder, &request()), None);
+    }
+
+    #[test]
+    fn expectations_that_did_not_hold_are_counted_and_those_of_later_are_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path();
+        let report = r#"{"digest": "d", "expectations": [{"holds": true}, {"holds": false}, {"holds": null, "at": 3.0}]}"#;
+        fs::write(folder.join("report.json"), report).unwrap();
+        let finished = Finished { digest: "d".into(), unmet: 1 };
+        assert_eq!(Done::write(folder, request()).unwrap(), finished);
+        assert_eq!(Done::find(folder, &request()), Some(finished));
     }
 
     #[test]

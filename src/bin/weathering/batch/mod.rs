@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 use std::error::Error;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
@@ -20,7 +21,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::cli::ReplayArgs;
 use child::Children;
-use done::{Done, Request};
+use done::{Done, Finished, Request};
 
 pub use child::end_with_input;
 
@@ -34,18 +35,19 @@ struct Job {
 /// What became of a job.
 enum Outcome {
     /// Run now, in so many seconds.
-    Ran { seconds: f64, digest: String },
+    Ran { seconds: f64, finished: Finished },
     /// Was there already.
-    Skipped { digest: String },
+    Skipped { finished: Finished },
     /// Why not.
     Failed(String),
 }
 
-/// Runs all scenarios that are not done, and prints what became of each.
+/// Runs all scenarios that are not done, and prints what became of each. Exit code 1 if all came to their ends, but not as they
+/// expect it.
 ///
 /// # Errors
 /// If any failed, or if the arguments make no sense for many.
-pub fn run(arguments: &ReplayArgs) -> Result<(), Box<dyn Error>> {
+pub fn run(arguments: &ReplayArgs) -> Result<ExitCode, Box<dyn Error>> {
     let Some(out) = &arguments.out else {
         return Err("many scenarios, --jobs and --only need --out, the folder for their folders".into());
     };
@@ -85,7 +87,22 @@ pub fn run(arguments: &ReplayArgs) -> Result<(), Box<dyn Error>> {
     if failed > 0 {
         return Err(format!("{failed} of {} scenarios failed", jobs.len()).into());
     }
-    Ok(())
+    let unmet = outcomes.iter().filter(|outcome| outcome.is_unexpected()).count();
+    if unmet > 0 {
+        eprintln!("{unmet} of {} scenarios came out not as expected", jobs.len());
+        return Ok(ExitCode::from(1));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+impl Outcome {
+    /// It came to its end, and something was not as expected.
+    fn is_unexpected(&self) -> bool {
+        match self {
+            Self::Ran { finished, .. } | Self::Skipped { finished } => finished.unmet > 0,
+            Self::Failed(_) => false,
+        }
+    }
 }
 
 /// A job for each file, in their order.
@@ -195,8 +212,8 @@ impl Batch {
             arguments: self.arguments.clone(),
             program: self.children.program_hash().to_owned(),
         };
-        if let Some(digest) = Done::find(&job.folder, &request) {
-            return Ok(Outcome::Skipped { digest });
+        if let Some(finished) = Done::find(&job.folder, &request) {
+            return Ok(Outcome::Skipped { finished });
         }
         Done::remove(&job.folder)?;
         let ran = self.children.run(&job.file, &job.folder, &self.arguments);
@@ -204,8 +221,8 @@ impl Batch {
             self.bar.suspend(|| eprintln!("{}: {line}", job.name));
         }
         ran.result?;
-        let digest = Done::write(&job.folder, request)?;
-        Ok(Outcome::Ran { seconds: begun.elapsed().as_secs_f64(), digest })
+        let finished = Done::write(&job.folder, request)?;
+        Ok(Outcome::Ran { seconds: begun.elapsed().as_secs_f64(), finished })
     }
 }
 

@@ -9,7 +9,7 @@ use bevy_weathering::record::Recording;
 
 use super::theme;
 use super::ui::{AddPanel, Place};
-use super::widgets::number;
+use super::widgets::{color, color_and_opacity, number};
 
 /// The effects that come with the project, by name. Made when they are first asked for.
 #[derive(Resource, Default)]
@@ -181,13 +181,13 @@ fn edit(ui: &mut egui::Ui, effect: &mut WeatherEffect) {
     number(ui, "bump", &mut effect.bump, (-1.0, 1.0), "Sine of the slope at its rim");
     for (label, paint) in [("colour", &mut effect.diffuse), ("gloss", &mut effect.specular)] {
         ui.horizontal(|ui| {
-            ui.color_edit_button_rgb(&mut paint.color);
+            color(ui, &mut paint.color);
             number(ui, label, &mut paint.opacity, (0.0, 1.0), "Opacity in its middle");
         });
     }
     ui.heading("How a particle looks");
     ui.horizontal(|ui| {
-        ui.color_edit_button_rgba_unmultiplied(&mut effect.look.color);
+        color_and_opacity(ui, &mut effect.look.color);
         ui.label("colour, opacity");
     });
     number(ui, "width, m", &mut effect.look.width, (0.0, 0.1), "Of the streak");
@@ -224,5 +224,15 @@ mod tests {
             assert_eq!(shipped(&mut world, name), Some(handle), "made twice");
         }
         assert_eq!(shipped(&mut world, "no such effect"), None);
+    }
+
+    #[test]
+    fn an_effect_that_is_only_looked_at_stays_as_it_is() {
+        for shipped in ShippedEffect::ALL {
+            let before = shipped.read().unwrap();
+            let mut effect = before.clone();
+            egui::__run_test_ui(|ui| edit(ui, &mut effect));
+            assert_eq!(effect, before, "{}", shipped.name);
+        }
     }
 }

@@ -86,7 +86,10 @@ fn show_emitter(ui: &mut egui::Ui, world: &mut World, entity: Entity) {
     }
     let about = "At the start; under a sky 0 is as fast as its drops fall";
     number(ui, "speed, m/s", &mut emitter.speed, (0.0, 60.0), about);
+    number(ui, "lifetime, s", &mut emitter.lifetime, (0.1, 60.0), "What hits nothing until then is removed");
     shape(ui, &mut emitter.shape);
+    // Before that its keys say where it is.
+    ui.add_enabled_ui(by_hand || !is_scripted, |ui| show_place(ui, world, entity));
     ui.add_enabled_ui(!is_recorded, |ui| {
         egui::ComboBox::from_label("effect").selected_text("exchange").show_ui(ui, |ui| {
             for name in effects::names() {
@@ -110,6 +113,45 @@ fn show_emitter(ui: &mut egui::Ui, world: &mut World, entity: Entity) {
     if is_removed {
         added::remove(world, entity);
     }
+}
+
+/// Where it is and which way it points.
+fn show_place(ui: &mut egui::Ui, world: &mut World, entity: Entity) {
+    let Some(before) = world.get::<Transform>(entity).copied() else { return };
+    let [mut place, aim] = [before.translation, before.forward().as_vec3()];
+    let (mut heading_deg, mut up_deg) = angles(aim);
+    let shown = (heading_deg, up_deg);
+    ui.horizontal(|ui| {
+        for (value, name) in [&mut place.x, &mut place.y, &mut place.z].into_iter().zip(["x ", "y ", "z "]) {
+            let drag = egui::DragValue::new(value).speed(0.02).range(-1000.0..=1000.0).prefix(name);
+            ui.add(drag).on_hover_text("Metres; drag, or click and type");
+        }
+        ui.label("place, m");
+    });
+    number(ui, "towards, degrees", &mut heading_deg, (-180.0, 180.0), "0 is -z, 90 is +x");
+    number(ui, "upwards, degrees", &mut up_deg, (-89.0, 89.0), "Rain falls straight down whatever this is");
+    let mut after = before.with_translation(place);
+    if (heading_deg, up_deg) != shown {
+        after = after.looking_to(way(heading_deg, up_deg), Vec3::Y);
+    }
+    // It is where it is shown to be, and a tick comes before transforms are propagated.
+    if after != before
+        && let Ok(mut entity) = world.get_entity_mut(entity)
+    {
+        entity.insert((after, GlobalTransform::from(after)));
+    }
+}
+
+/// Of a direction: where it goes to along the ground, and how far up; degrees.
+fn angles(way: Vec3) -> (f32, f32) {
+    (way.x.atan2(-way.z).to_degrees(), way.y.clamp(-1.0, 1.0).asin().to_degrees())
+}
+
+/// The direction of such angles.
+fn way(heading_deg: f32, up_deg: f32) -> Vec3 {
+    let (up, along) = up_deg.to_radians().sin_cos();
+    let (sin, cos) = heading_deg.to_radians().sin_cos();
+    Vec3::new(sin * along, up, -cos * along)
 }
 
 fn set_by_hand(world: &mut World, entity: Entity, by_hand: bool) {
@@ -148,6 +190,41 @@ fn shape(ui: &mut egui::Ui, shape: &mut EmitterShape) {
         EmitterShape::Sky { half_size } => {
             number(ui, "half x, m", &mut half_size.x, (0.01, 100.0), "Along x");
             number(ui, "half z, m", &mut half_size.y, (0.01, 100.0), "Along z");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_and_their_angles_belong_together() {
+        for (heading, up) in [(-170.0, -80.0), (0.0, 0.0), (90.0, 45.0)] {
+            let (heading_again, up_again) = angles(way(heading, up));
+            assert!((heading - heading_again).abs() < 1e-2 && (up - up_again).abs() < 1e-2);
+        }
+        assert!((way(90.0, 0.0) - Vec3::X).length() < 1e-6 && (way(0.0, 0.0) - Vec3::NEG_Z).length() < 1e-6);
+        // Straight down is no direction along the ground, but somewhere.
+        assert!(angles(Vec3::NEG_Y).0.is_finite());
+    }
+
+    #[test]
+    fn whatever_is_edited_is_a_change() {
+        let before = Emitter::default();
+        let edits: [fn(&mut Emitter); 6] = [
+            |emitter| emitter.rate += 1.0,
+            |emitter| emitter.lifetime += 1.0,
+            |emitter| emitter.speed += 1.0,
+            |emitter| emitter.flow = Flow::MmPerHour(3.0),
+            |emitter| emitter.shape = EmitterShape::Disc { radius: 0.123 },
+            |emitter| emitter.enabled = !emitter.enabled,
+        ];
+        assert!(!is_changed(&before, &before));
+        for edit in edits {
+            let mut emitter = before.clone();
+            edit(&mut emitter);
+            assert!(is_changed(&before, &emitter));
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Keys, and the list of them.
 
+use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::prelude::*;
 use bevy_egui::egui;
 
@@ -26,6 +27,7 @@ const KEYS: &[(&str, &str)] = &[
     ("R", "start over"),
     ("U", "hide panels, show them"),
     ("M, P", "maps, plots"),
+    ("PageUp PageDown", "the panel before, after"),
     ("V", "what surfaces show: look, wetness, film, saturation, source"),
     ("X", "export the scene as it is"),
     ("F9", "record a session; write it and end"),
@@ -45,10 +47,21 @@ fn reset(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
     }
 }
 
+/// Whether somebody has typed a question mark, wherever it is on their keyboard.
+fn asks(input: &KeyboardInput) -> bool {
+    input.state.is_pressed() && !input.repeat && input.logical_key == Key::Character("?".into())
+}
+
 /// Keys that change settings.
-fn choose(keys: Res<ButtonInput<KeyCode>>, mut settings: ResMut<Settings>, mut help: ResMut<Help>) {
+fn choose(
+    keys: Res<ButtonInput<KeyCode>>,
+    mut typed: MessageReader<KeyboardInput>,
+    mut settings: ResMut<Settings>,
+    mut help: ResMut<Help>,
+) {
     let pressed = |key| keys.just_pressed(key);
-    if pressed(KeyCode::F1) || pressed(KeyCode::Slash) {
+    let is_asked = typed.read().filter(|input| asks(input)).count() % 2 == 1;
+    if pressed(KeyCode::F1) || is_asked {
         help.0 = !help.0;
     }
     if pressed(KeyCode::KeyU) {
@@ -96,4 +109,68 @@ pub fn show_help(context: &egui::Context, open: &mut bool) {
             });
         });
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::path::Path;
+
+    use bevy::input::ButtonState;
+
+    use super::*;
+
+    /// Names of the keys of an entry of the list, as Bevy has them; words that are none stay what they are.
+    fn names(keys: &str) -> Vec<String> {
+        let name = |word: &str| match word {
+            "," => "Comma".to_owned(),
+            "." => "Period".to_owned(),
+            "Ctrl" => "ControlLeft".to_owned(),
+            "Shift" => "ShiftLeft".to_owned(),
+            _ if word.len() == 1 && word.chars().all(char::is_alphabetic) => format!("Key{word}"),
+            _ if word.len() == 1 && word.chars().all(char::is_numeric) => format!("Digit{word}"),
+            _ => word.to_owned(),
+        };
+        let words = keys.split([' ', '+']);
+        words
+            .map(|word| name(if word.len() > 1 { word.trim_end_matches([',', ':']) } else { word }))
+            .collect()
+    }
+
+    #[test]
+    fn every_key_that_does_something_is_listed() {
+        let mut listed: BTreeSet<String> = KEYS.iter().flat_map(|(keys, _)| names(keys)).collect();
+        let about = KEYS.iter().map(|(_, does)| does.replace('(', ""));
+        listed.extend(about.flat_map(|does| names(&does)));
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/bin/weathering/sandbox");
+        let mut used = BTreeSet::new();
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let text = std::fs::read_to_string(entry.unwrap().path()).unwrap();
+            let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+            let keys = code.split("KeyCode::").skip(1);
+            let keys = keys.map(|rest| rest.split(|letter: char| !letter.is_alphanumeric()).next());
+            // Those at the right do what those at the left do.
+            used.extend(keys.flatten().map(|key| key.replace("Right", "Left")).filter(|key| !key.is_empty()));
+        }
+        assert!(used.len() > 25, "{used:?}");
+        let missing: Vec<_> = used.difference(&listed).collect();
+        assert!(missing.is_empty(), "not in the list of keys: {missing:?}");
+    }
+
+    #[test]
+    fn a_question_mark_is_one_on_every_keyboard() {
+        let input = |key_code, typed: &str, state, repeat| KeyboardInput {
+            key_code,
+            logical_key: Key::Character(typed.into()),
+            state,
+            text: None,
+            repeat,
+            window: Entity::PLACEHOLDER,
+        };
+        assert!(asks(&input(KeyCode::Slash, "?", ButtonState::Pressed, false)));
+        assert!(asks(&input(KeyCode::Minus, "?", ButtonState::Pressed, false)));
+        assert!(!asks(&input(KeyCode::Slash, "-", ButtonState::Pressed, false)));
+        assert!(!asks(&input(KeyCode::Slash, "?", ButtonState::Released, false)));
+        assert!(!asks(&input(KeyCode::Slash, "?", ButtonState::Pressed, true)));
+    }
 }

@@ -4,10 +4,11 @@ use std::time::Instant;
 
 use bevy::prelude::*;
 use bevy_egui::{EguiTextureHandle, EguiUserTextures, egui};
+use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::emitter::Source;
 use bevy_weathering::matter::SurfaceMatter;
 use bevy_weathering::overlay::Overlays;
-use bevy_weathering::wetting::{SurfaceWater, TexelGeometry, WetGeometry, Wetness, WetnessQuery};
+use bevy_weathering::wetting::{Exposure, SurfaceWater, TexelGeometry, WetGeometry, Wetness, WetnessQuery};
 
 use super::selection::{Selected, choose_surface};
 use super::settings::Settings;
@@ -19,6 +20,9 @@ const SIDE: usize = 128;
 /// Seconds between two readings.
 const EVERY: f32 = 0.5;
 
+/// In place of the source of water where there is none.
+const DRY: f32 = -1.0;
+
 /// What is shown of a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Channel {
@@ -26,25 +30,31 @@ enum Channel {
     Film,
     Absorbed,
     Saturation,
+    Since,
     Source,
     Dust,
     Mud,
     Snow,
+    Air,
+    Sun,
     Colour,
     Gloss,
     Normal,
 }
 
 impl Channel {
-    const ALL: [(Self, &'static str); 11] = [
+    const ALL: [(Self, &'static str); 14] = [
         (Self::Wetness, "looks wet"),
         (Self::Film, "film"),
         (Self::Absorbed, "absorbed"),
         (Self::Saturation, "pores full"),
+        (Self::Since, "wet for"),
         (Self::Source, "source"),
         (Self::Dust, "dust"),
         (Self::Mud, "mud"),
         (Self::Snow, "snow"),
+        (Self::Air, "air"),
+        (Self::Sun, "sun"),
         (Self::Colour, "colour"),
         (Self::Gloss, "gloss"),
         (Self::Normal, "normal"),
@@ -60,9 +70,29 @@ impl Channel {
         }
     }
 
-    /// Whether it is a part of a whole, and not mm.
+    /// What red, green and blue of a painted map say.
+    fn colours(self) -> [&'static str; 3] {
+        match self {
+            Self::Gloss => ["reflectance", "smoothness", "nothing"],
+            Self::Normal => ["slope along u", "slope along v", "nothing"],
+            _ => ["red", "green", "blue"],
+        }
+    }
+
+    /// Whether it is a part of a whole.
     fn is_part(self) -> bool {
-        matches!(self, Self::Wetness | Self::Saturation)
+        matches!(self, Self::Wetness | Self::Saturation | Self::Sun)
+    }
+
+    /// Behind its numbers.
+    fn unit(self) -> &'static str {
+        match self {
+            Self::Since => " s",
+            // Of what an even surface in the open gets; more on what stands out.
+            Self::Air => "",
+            _ if self.is_part() => "",
+            _ => " mm",
+        }
     }
 
     fn of_water(self, wetness: &Wetness) -> f32 {
@@ -79,6 +109,8 @@ impl Channel {
 #[derive(Resource)]
 struct MapView {
     channel: Channel,
+    /// Of a painted map, whether red, green and blue are shown.
+    shown: [bool; 3],
     /// Row by row from v = 0; empty until it has been read.
     values: Vec<f32>,
     /// Of what, and when.
@@ -89,7 +121,14 @@ struct MapView {
 
 impl Default for MapView {
     fn default() -> Self {
-        Self { channel: Channel::Wetness, values: Vec::new(), read: None, is_new: false, texture: None }
+        Self {
+            channel: Channel::Wetness,
+            shown: [true; 3],
+            values: Vec::new(),
+            read: None,
+            is_new: false,
+            texture: None,
+        }
     }
 }
 
@@ -100,8 +139,9 @@ pub fn plugin(app: &mut App) {
 fn sample(
     settings: Res<Settings>,
     selected: Res<Selected>,
+    clock: Res<WeatheringClock>,
     wetness: WetnessQuery,
-    surfaces: Query<(&SurfaceWater, &WetGeometry, Option<&SurfaceMatter>)>,
+    surfaces: Query<(&SurfaceWater, &WetGeometry, Option<&SurfaceMatter>, Option<&Exposure>)>,
     mut view: ResMut<MapView>,
 ) {
     let Some(surface) = selected.0.filter(|_| settings.maps && settings.panels) else { return };
@@ -112,7 +152,7 @@ fn sample(
     if is_fresh || matches!(channel, Channel::Colour | Channel::Gloss | Channel::Normal) {
         return;
     }
-    let Ok((water, geometry, matter)) = surfaces.get(surface) else { return };
+    let Ok((water, geometry, matter, exposure)) = surfaces.get(surface) else { return };
     let of_matter = |uv: Vec2| {
         let texel = texel_at(water.size(), &geometry.0, uv)?;
         let held = matter?.texels().get(texel as usize)?;
@@ -123,15 +163,25 @@ fn sample(
         };
         Some((f64::from(units) * geometry.0.unit_mm(water.units(), texel)) as f32)
     };
+    let wet_from = |uv: Vec2| {
+        let here = wetness.at_uv(surface, uv)?;
+        let texel = texel_at(water.size(), &geometry.0, uv)?;
+        (here.film_mm + here.absorbed_mm > 0.0).then(|| water.origin(texel).unwrap_or_default())
+    };
     let middle = |index: usize| (index as f32 + 0.5) / SIDE as f32;
     let value = |index: usize| {
         let uv = Vec2::new(middle(index % SIDE), middle(index / SIDE));
         match channel {
             Channel::Dust | Channel::Mud | Channel::Snow => of_matter(uv).unwrap_or(0.0),
-            Channel::Source => {
-                let origin = texel_at(water.size(), &geometry.0, uv).and_then(|texel| water.origin(texel));
-                f32::from(origin.unwrap_or_default().source.0)
+            Channel::Since => wet_from(uv).map_or(0.0, |origin| seconds_since(&clock, origin.since)),
+            Channel::Air | Channel::Sun => {
+                let texel = texel_at(water.size(), &geometry.0, uv);
+                let parts = exposure.zip(texel).and_then(|(exposure, texel)| exposure.get(texel));
+                // What is used while it is not known.
+                let (air, sun) = parts.unwrap_or((1.0, 0.0));
+                (if channel == Channel::Air { air } else { sun }) as f32
             }
+            Channel::Source => wet_from(uv).map_or(DRY, |origin| f32::from(origin.source.0)),
             _ => wetness.at_uv(surface, uv).map_or(0.0, |wetness| channel.of_water(&wetness)),
         }
     };
@@ -139,6 +189,11 @@ fn sample(
     view.values.extend((0..SIDE * SIDE).map(value));
     view.read = Some((surface, channel, Instant::now()));
     view.is_new = true;
+}
+
+/// Seconds of weather from a tick until now.
+fn seconds_since(clock: &WeatheringClock, tick: u32) -> f32 {
+    (f64::from(clock.tick().saturating_sub(tick)) / f64::from(clock.hz())) as f32
 }
 
 /// The texel below a uv of 0..=1, of a map with so many along each side.
@@ -156,6 +211,12 @@ pub fn texel_at(size: u32, geometry: &TexelGeometry, uv: Vec2) -> Option<u32> {
 /// What the brightest colour stands for.
 fn most(values: &[f32], channel: Channel) -> f32 {
     if channel.is_part() { 1.0 } else { values.iter().copied().fold(1e-3, f32::max) }
+}
+
+/// What leaves only some of red, green and blue of a picture.
+fn tint([red, green, blue]: [bool; 3]) -> egui::Color32 {
+    let part = |is_shown: bool| if is_shown { 255 } else { 0 };
+    egui::Color32::from_rgb(part(red), part(green), part(blue))
 }
 
 /// From black over blue to white.
@@ -181,10 +242,17 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     let Some(overlays) = world.get::<Overlays>(surface) else { return };
     if let Some(image) = channel.image(overlays).cloned() {
         ui.small(format!("{0} x {0} texels, premultiplied", overlays.size));
+        let mut shown = world.resource::<MapView>().shown;
+        ui.horizontal_wrapped(|ui| {
+            for (is_shown, name) in shown.iter_mut().zip(channel.colours()) {
+                ui.toggle_value(is_shown, name);
+            }
+        });
+        world.resource_mut::<MapView>().shown = shown;
         // Does not keep the map of a surface that has gone.
         let handle = EguiTextureHandle::Weak(image.id());
         let texture = world.resource_mut::<EguiUserTextures>().add_image(handle);
-        ui.add(egui::Image::new((texture, size)).bg_fill(egui::Color32::BLACK));
+        ui.add(egui::Image::new((texture, size)).bg_fill(egui::Color32::BLACK).tint(tint(shown)));
         return;
     }
     let mut view = world.resource_mut::<MapView>();
@@ -195,7 +263,9 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     let most = most(&view.values, channel);
     if view.is_new || view.texture.is_none() {
         view.is_new = false;
-        let of_source = |value: f32| sources::colour(Source(value as u16));
+        let of_source = |value: f32| {
+            if value == DRY { egui::Color32::BLACK } else { sources::colour(Source(value as u16)) }
+        };
         let is_source = channel == Channel::Source;
         let pixel = |value: &f32| if is_source { of_source(*value) } else { colour(value / most) };
         let pixels = view.values.iter().map(pixel).collect();
@@ -215,13 +285,13 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     });
     if channel == Channel::Source {
         if let Some((part, value)) = hovered {
-            let name = sources::name(world, Source(value as u16));
+            let name = if value == DRY { "dry".into() } else { sources::name(world, Source(value as u16)) };
             ui.label(format!("uv {:.3} {:.3}: {name}", part.x, part.y));
         }
         sources::legend(ui, world);
         return;
     }
-    let unit = if channel.is_part() { "" } else { " mm" };
+    let unit = channel.unit();
     ui.small(format!("white is {most:.3}{unit}"));
     if let Some((part, value)) = hovered {
         ui.label(format!("uv {:.3} {:.3}: {value:.4}{unit}", part.x, part.y));
@@ -241,5 +311,15 @@ mod tests {
         assert_eq!(most(&[0.0, 3.0, 2.0], Channel::Film), 3.0);
         assert_eq!(most(&[0.0, 0.2], Channel::Wetness), 1.0);
         assert!(most(&[], Channel::Dust) > 0.0);
+    }
+
+    #[test]
+    fn every_map_has_a_name_and_a_unit() {
+        let names: std::collections::BTreeSet<_> = Channel::ALL.iter().map(|(_, name)| name).collect();
+        assert_eq!(names.len(), Channel::ALL.len());
+        let units = [Channel::Since, Channel::Film, Channel::Sun].map(Channel::unit);
+        assert_eq!(units, [" s", " mm", ""]);
+        assert_eq!(tint([true; 3]), egui::Color32::WHITE);
+        assert_eq!(tint([false, true, false]).to_array(), [0, 255, 0, 255]);
     }
 }

@@ -2,14 +2,16 @@
 
 use bevy::prelude::*;
 use bevy_egui::egui;
+use bevy_weathering::material::models::lagarde::gloss_from_roughness;
 use bevy_weathering::material::{
-    BaseBrdf, Coated, Flood, Grains, Pores, PorositySource, PorousMaterial, StandingWater, TextureMeaning,
-    Tweaked, WetLook, WettingModel,
+    BaseBrdf, Coated, DryMaterial, Flood, Grains, PlayedWetMap, Playing, Pores, PorositySource,
+    PorousMaterial, StandingWater, TextureMeaning, Tweaked, WetLook, WettingModel,
 };
+use bevy_weathering::record::Recording;
 
 use super::selection::{Selected, choose_surface};
 use super::ui::{AddPanel, Place};
-use super::widgets::parameter;
+use super::widgets::{color, number, parameter};
 
 pub fn plugin(app: &mut App) {
     app.add_panel(Place::Side, "Materials", show);
@@ -44,6 +46,66 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
         && let Ok(mut entity) = world.get_entity_mut(surface)
     {
         entity.insert(water);
+    }
+    // No event can say it, and it touches no water: a recording is of the scene as its file has it.
+    let is_free = !world.contains_resource::<Recording>();
+    ui.add_enabled_ui(is_free, |ui| {
+        show_dry(ui, world, surface);
+        show_played(ui, world, surface);
+    });
+}
+
+/// The surface when dry: the material that it came with, which others may have, too.
+fn show_dry(ui: &mut egui::Ui, world: &mut World, surface: Entity) {
+    let Some(handle) = world.get::<DryMaterial>(surface).map(|dry| dry.0.clone()) else { return };
+    let mut materials = world.resource_mut::<Assets<StandardMaterial>>();
+    let Some(before) = materials.get(&handle) else { return };
+    let linear = before.base_color.to_linear();
+    let mut k_d = [linear.red, linear.green, linear.blue];
+    let mut numbers = [before.perceptual_roughness, before.reflectance, before.metallic];
+    let shown = (k_d, numbers);
+    ui.heading("Dry");
+    ui.horizontal(|ui| {
+        color(ui, &mut k_d);
+        ui.label("k_d")
+            .on_hover_text("Its colour; multiplies its texture. Surfaces of the same material share it");
+    });
+    let [roughness, reflectance, metalness] = &mut numbers;
+    number(ui, "roughness", roughness, (0.0, 1.0), "Perceptual; multiplies its texture");
+    ui.small(format!("gloss {:.2}", gloss_from_roughness(f64::from(*roughness))));
+    number(ui, "reflectance", reflectance, (0.0, 1.0), "F0 = 0.16 reflectance^2; of what is no metal");
+    ui.small(format!("F0 {:.3}", 0.16 * *reflectance * *reflectance));
+    number(ui, "metalness", metalness, (0.0, 1.0), "Metal has no pores");
+    if (k_d, numbers) != shown
+        && let Some(mut material) = materials.get_mut(&handle)
+    {
+        let [red, green, blue] = k_d;
+        material.base_color = LinearRgba { red, green, blue, ..linear }.into();
+        [material.perceptual_roughness, material.reflectance, material.metallic] = numbers;
+    }
+}
+
+/// A wet map that is played on the surface, if there is one.
+fn show_played(ui: &mut egui::Ui, world: &mut World, surface: Entity) {
+    let Some(before) = world.get::<PlayedWetMap>(surface).cloned() else { return };
+    let mut played = before.clone();
+    ui.heading("Wet map that is played");
+    number(ui, "lasts, s", &mut played.seconds, (0.1, 600.0), "From dry to wet, or back");
+    number(
+        ui,
+        "t_fill",
+        &mut played.t_fill,
+        (0.0, 1.0),
+        "Of the whole: how soft the wet border is; 0 is hard",
+    );
+    ui.horizontal(|ui| {
+        ui.selectable_value(&mut played.playing, Playing::Wetting, "gets wet");
+        ui.selectable_value(&mut played.playing, Playing::Drying, "dries");
+    });
+    if played != before
+        && let Ok(mut entity) = world.get_entity_mut(surface)
+    {
+        entity.insert(played);
     }
 }
 
@@ -129,7 +191,7 @@ fn show_model(ui: &mut egui::Ui, material: &mut PorousMaterial) {
         }
         WettingModel::Authored(look) => {
             ui.horizontal(|ui| {
-                ui.color_edit_button_rgb(&mut look.color);
+                color(ui, &mut look.color);
                 ui.label("colour when wet");
             });
             parameter(ui, "roughness", "model.roughness", &mut look.roughness, None, "When wet");
@@ -210,5 +272,63 @@ fn show_standing(ui: &mut egui::Ui, water: &mut StandingWater) {
     for (value, symbol) in water.absorption_per_mm.iter_mut().zip(["red, 1/mm", "green, 1/mm", "blue, 1/mm"])
     {
         parameter(ui, symbol, "absorption_per_mm", value, Some(1.0), "What murky water takes away");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_only_looked_at_stays_as_it_is() {
+        let models = [
+            WettingModel::Lagarde(Tweaked::default()),
+            WettingModel::Authored(WetLook::default()),
+            WettingModel::Hnat(Pores::default()),
+        ];
+        let others = models.map(|model| PorousMaterial { model, ..default() });
+        for before in PorousMaterial::PRESETS.into_iter().map(|(_, preset)| preset).chain(others) {
+            let mut material = before;
+            egui::__run_test_ui(|ui| {
+                show_pores(ui, &mut material);
+                show_model(ui, &mut material);
+            });
+            assert_eq!(material, before);
+        }
+        for flood in [
+            Flood::None,
+            Flood::Accumulation { cracks: 0.3, puddles: 1.7 },
+            Flood::Level { level_mm: 3.0, basin_mm: 20.0, relief_mm: 5.0 },
+        ] {
+            let before = StandingWater { flood, ..default() };
+            let mut water = before;
+            egui::__run_test_ui(|ui| show_standing(ui, &mut water));
+            assert_eq!(water, before);
+        }
+    }
+
+    #[test]
+    fn the_dry_material_and_the_played_map_are_shown_and_not_touched() {
+        let mut world = World::new();
+        let mut materials = Assets::<StandardMaterial>::default();
+        let base_color = Color::linear_rgb(0.42, 0.2, 0.13);
+        let handle = materials.add(StandardMaterial { base_color, perceptual_roughness: 0.7, ..default() });
+        world.insert_resource(materials);
+        let played = PlayedWetMap { seconds: 12.0, t_fill: 0.3, ..default() };
+        let surface = world.spawn((DryMaterial(handle.clone()), played.clone())).id();
+        world.clear_trackers();
+        egui::__run_test_ui(|ui| {
+            show_dry(ui, &mut world, surface);
+            show_played(ui, &mut world, surface);
+        });
+        let material = world.resource::<Assets<StandardMaterial>>().get(&handle).unwrap();
+        assert_eq!((material.base_color, material.perceptual_roughness), (base_color, 0.7));
+        assert_eq!(world.get::<PlayedWetMap>(surface), Some(&played));
+        // A surface without either has nothing to show.
+        let bare = world.spawn_empty().id();
+        egui::__run_test_ui(|ui| {
+            show_dry(ui, &mut world, bare);
+            show_played(ui, &mut world, bare);
+        });
     }
 }

@@ -92,7 +92,7 @@ pub fn spawn(world: &mut World, loaded: &LoadedScenario) {
     world.spawn((SceneEntity, Model, Name::new("model"), WorldAssetRoot(scene), Transform::default()));
 }
 
-/// Meshes of models that have texture coordinates get wet, as soon as they are there.
+/// Meshes of models get wet, as soon as they are there; those without texture coordinates are given some.
 fn weather_meshes(
     mut commands: Commands,
     meshes: Res<Assets<Mesh>>,
@@ -103,21 +103,15 @@ fn weather_meshes(
         (With<MeshMaterial3d<StandardMaterial>>, Without<Weatherable>, Without<Cover>),
     >,
     transforms: Query<&GlobalTransform>,
-    mut refused: Local<Vec<AssetId<Mesh>>>,
 ) {
     if models.is_empty() {
         return;
     }
     for (entity, handle) in &shown {
-        if refused.contains(&handle.id()) || !models.contains(parents.root_ancestor(entity)) {
+        if !models.contains(parents.root_ancestor(entity)) {
             continue;
         }
         let Some(mesh) = meshes.get(&handle.0) else { continue };
-        if !mesh.contains_attribute(Mesh::ATTRIBUTE_UV_0) {
-            refused.push(handle.id());
-            warn!("a mesh of the model has no texture coordinates and cannot get wet");
-            continue;
-        }
         let scale = transforms.get(entity).map_or(1.0, |transform| transform.scale().abs().max_element());
         commands.entity(entity).insert(Weatherable { map_size: map_size(mesh, scale), ..default() });
     }
@@ -158,6 +152,30 @@ mod tests {
     fn models_are_known_by_their_names() {
         let is = |name: &str| is_model(Path::new(name));
         assert!(is("a/b.glb") && is("B.GLTF") && !is("c.ron") && !is("glb"));
+    }
+
+    #[test]
+    fn every_mesh_of_a_model_gets_wet_and_no_other() {
+        let mut app = App::new();
+        app.init_resource::<Assets<Mesh>>();
+        plugin(&mut app);
+        let world = app.world_mut();
+        let mut shown = |mesh: Mesh| {
+            let mesh = world.resource_mut::<Assets<Mesh>>().add(mesh);
+            world.spawn((Mesh3d(mesh), MeshMaterial3d(Handle::<StandardMaterial>::default()))).id()
+        };
+        let cube = || Mesh::from(Cuboid::new(0.4, 0.4, 0.4));
+        let with_uvs = shown(cube());
+        let without = shown(cube().with_removed_attribute(Mesh::ATTRIBUTE_UV_0));
+        let elsewhere = shown(cube());
+        let model = world.spawn(Model).id();
+        let node = world.spawn(ChildOf(model)).id();
+        for mesh in [with_uvs, without] {
+            world.entity_mut(mesh).insert(ChildOf(node));
+        }
+        app.update();
+        let is_wet = |mesh: Entity| app.world().get::<Weatherable>(mesh).is_some();
+        assert_eq!([with_uvs, without, elsewhere].map(is_wet), [true, true, false]);
     }
 
     #[test]

@@ -384,7 +384,8 @@ fn take(world: &mut World, purpose: Purpose, maps: Vec<[Option<Vec<u8>>; 3]>) ->
         }
     };
     let scenario: LoadedScenario = world.resource::<Opened>().loaded.clone();
-    let scene = SavedScene::capture(world, &scenario, colors);
+    // Sliders have been at them.
+    let scene = SavedScene::capture(world, &scenario, colors).with_materials(world);
     let to = folder.clone();
     let task = AsyncComputeTaskPool::get().spawn(async move { scene.write(&to) });
     Some(Step::Writing { folder, task })

@@ -108,6 +108,7 @@ pub fn plugin(app: &mut App) {
         .init_resource::<Help>()
         .init_resource::<Note>()
         .add_systems(Startup, spawn_camera)
+        .add_systems(Update, turn_over.run_if(keyboard_is_free))
         .add_systems(EguiPrimaryContextPass, draw);
     // The scene's camera would be taken, which goes with the scene.
     app.world_mut().resource_mut::<EguiGlobalSettings>().auto_create_primary_context = false;
@@ -196,6 +197,24 @@ fn draw(world: &mut World, mut is_dressed: Local<bool>) {
     input.keyboard = context.text_edit_focused();
 }
 
+/// The panel before the open one, or the one after it.
+fn turn_over(keys: Res<ButtonInput<KeyCode>>, panels: Res<Panels>, mut settings: ResMut<Settings>) {
+    let pressed = |key| isize::from(keys.just_pressed(key));
+    let steps = pressed(KeyCode::PageDown) - pressed(KeyCode::PageUp);
+    if steps != 0 {
+        let sides = panels.0.iter().filter(|(place, ..)| *place == Place::Side);
+        let titles: Vec<&str> = sides.map(|(_, title, _)| *title).collect();
+        settings.panel = beside(&titles, &settings.panel, steps).to_owned();
+    }
+}
+
+/// The title so many steps behind another; before the first comes the last.
+fn beside<'a>(titles: &[&'a str], open: &str, steps: isize) -> &'a str {
+    let now = titles.iter().position(|title| *title == open).unwrap_or(0) as isize;
+    let next = (now + steps).checked_rem_euclid(titles.len() as isize).unwrap_or(0);
+    titles.get(next as usize).copied().unwrap_or_default()
+}
+
 /// The tabs at the left, and the open one.
 fn show_side(ui: &mut egui::Ui, world: &mut World, side: &[(Place, &'static str, Show)]) {
     let mut open = world.resource::<Settings>().panel.clone();
@@ -248,4 +267,24 @@ fn show_note(context: &egui::Context, free: egui::Rect, note: &Note) {
             }
         });
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn panels_are_turned_over_in_a_ring() {
+        let titles = ["Scenes", "Hose", "Files"];
+        assert_eq!(
+            ["Scenes", "Hose", "Files"].map(|open| beside(&titles, open, 1)),
+            ["Hose", "Files", "Scenes"]
+        );
+        assert_eq!(
+            ["Scenes", "Hose", "Files"].map(|open| beside(&titles, open, -1)),
+            ["Files", "Scenes", "Hose"]
+        );
+        // One of another version, and none at all.
+        assert_eq!((beside(&titles, "Gone", 1), beside(&[], "Scenes", 1)), ("Hose", ""));
+    }
 }

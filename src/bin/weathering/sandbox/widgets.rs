@@ -1,6 +1,6 @@
 //! Sliders and the like, all alike.
 
-use bevy_egui::egui::{self, Ui};
+use bevy_egui::egui::{self, Response, Ui};
 use bevy_weathering::material::range_of;
 
 /// A number within a range. Wide ranges are logarithmic. What is out of it already stays so until somebody edits it.
@@ -32,5 +32,44 @@ pub fn parameter(ui: &mut Ui, symbol: &str, field: &str, value: &mut f32, most: 
     // What is typed may be anything.
     if !(*value >= least && *value <= allowed) {
         *value = if value.is_nan() { least } else { value.clamp(least, allowed) };
+    }
+}
+
+/// A colour, linear RGB. It stays as it is to the bit until somebody chooses another: the way to its hue and back rounds, and
+/// what is rounded would count as edited.
+pub fn color(ui: &mut Ui, rgb: &mut [f32; 3]) -> Response {
+    let mut chosen = *rgb;
+    let button = ui.color_edit_button_rgb(&mut chosen);
+    if button.changed() {
+        *rgb = chosen;
+    }
+    button
+}
+
+/// The same with opacity, not premultiplied.
+pub fn color_and_opacity(ui: &mut Ui, rgba: &mut [f32; 4]) -> Response {
+    let mut chosen = *rgba;
+    let button = ui.color_edit_button_rgba_unmultiplied(&mut chosen);
+    if button.changed() {
+        *rgba = chosen;
+    }
+    button
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_that_are_only_looked_at_stay_to_the_bit() {
+        for value in [0.1, 0.3, 0.7, 0.82] {
+            let (rgb, rgba) = ([value, 0.45, 0.9], [0.75, value, 0.9, 0.35]);
+            let (mut one, mut other) = (rgb, rgba);
+            egui::__run_test_ui(|ui| {
+                color(ui, &mut one);
+                color_and_opacity(ui, &mut other);
+            });
+            assert_eq!((one, other), (rgb, rgba));
+        }
     }
 }
