@@ -16,6 +16,7 @@ mod content;
 mod digest;
 mod error;
 mod files;
+mod follow;
 mod gltf_images;
 mod gltf_limits;
 mod gltf_uris;

@@ -10,12 +10,13 @@ use bevy::prelude::*;
 use bevy::render::RenderApp;
 
 use super::content::{Content, Looks};
+use super::follow::{follow_effect, follow_effect_files};
 use super::motion::{ScenarioCamera, move_camera};
 use super::timeline::{MaterialHandles, apply_events_plugin, camera_keys, emitter_motion, insert_events};
 use super::{Digest, LoadedScenario, MeshSpec, Scenario, ScenarioError};
 use crate::clock::ClockPlugin;
 use crate::collision::{BuildColliders, MeshColliders, NotWeatherable, SurfaceCollider};
-use crate::effect::{EffectTable, WeatherEffect};
+use crate::effect::{EffectTable, RefreshEffects, WeatherEffect};
 use crate::emitter::{EmissionSeed, Emitter};
 use crate::material::{PlayedWetMap, Playing};
 use crate::overlay::{FramesWork, OverlayUv, PrepareStamps, TexelArea, Unmapped, Weatherable};
@@ -67,7 +68,8 @@ struct CurrentScenario(LoadedScenario);
 pub struct SceneEntity;
 
 /// The folder that the app's asset server reads from, where it may be another than the scenario's tree: then files of the
-/// scenario are loaded by absolute paths, which the asset server must allow.
+/// scenario are loaded by absolute paths, which the asset server must allow. If it is the same, and the asset server watches it,
+/// effects follow their files.
 #[derive(Resource, Debug, Clone)]
 pub struct AssetTree(pub PathBuf);
 
@@ -104,6 +106,7 @@ impl Plugin for ScenarioPlugin {
                     .after(MeasureSurfaces)
                     .after(PrepareStamps),
             )
+            .add_systems(PreUpdate, follow_effect_files.before(RefreshEffects))
             .add_systems(Update, move_camera);
         apply_events_plugin(app);
 
@@ -149,7 +152,9 @@ fn asset_path(world: &World, loaded: &LoadedScenario, path: &str) -> String {
 pub(super) fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: Content, looks: Looks) {
     let scenario = &loaded.scenario;
     for (index, effect) in content.effects.into_iter().enumerate() {
-        spawn_emitter(world, scenario, index, effect);
+        if let Some(emitter) = spawn_emitter(world, scenario, index, effect) {
+            follow_effect(world, loaded, index, emitter);
+        }
     }
     let mut materials = Vec::new();
     if looks != Looks::None {

@@ -7,7 +7,6 @@ use super::keys::SCENARIO;
 use super::screen::{Sandbox, Scenery, Screen};
 
 #[test]
-#[ignore = "fails on a loaded machine: the window was shown black after its 4 s of patience, which are 15 s now; not run since"]
 fn the_window_appears_with_its_first_picture_and_effects_follow_their_files() {
     let Some(screen) = Screen::start() else { return };
     let scenery = Scenery::new(SCENARIO);
