@@ -11,6 +11,7 @@ use bevy::render::render_resource::PollType;
 use bevy::render::renderer::RenderDevice;
 
 use super::ReplayError;
+use crate::overlay::SplatStats;
 
 /// Why nothing is drawn any more.
 #[derive(Resource, Debug, Clone, PartialEq, Eq)]
@@ -38,8 +39,12 @@ pub fn describe_render_error(error: &RenderError) -> String {
 }
 
 /// # Errors
-/// [`ReplayError::Renderer`] once the renderer has failed.
+/// [`ReplayError::Renderer`] once the renderer has failed, or could not paint something.
 pub(super) fn check(world: &World) -> Result<(), ReplayError> {
+    if world.get_resource::<SplatStats>().is_some_and(|stats| stats.lost() > 0) {
+        let why = "a shader that paints splats did not compile, as the log tells";
+        return Err(ReplayError::Renderer(why.into()));
+    }
     match world.get_resource::<RenderFailure>() {
         Some(failure) => Err(ReplayError::Renderer(failure.0.clone())),
         None => Ok(()),
