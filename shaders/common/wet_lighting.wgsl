@@ -18,7 +18,7 @@
     shadows,
 }
 #import bevy_weathering::{
-    water_film::{fresnel, WATER_REFLECTANCE},
+    water_film::{film_transmission, fresnel, WATER_REFLECTANCE},
     wet_layers::{
         AMBIENT_COSINE, Point, Through, add_water, blinn_phong, clearness, matter_coefficients, point_from_pbr,
         through_water,
@@ -225,7 +225,7 @@ fn apply_wet_lighting(in: PbrInput, water: Water, normal: vec3<f32>) -> vec4<f32
     let mirrored = fresnel(WATER_REFLECTANCE, point.surface.NdotV);
     let clear = clearness(point, AMBIENT_COSINE) * (1.0 - pores * mirrored);
     let spread = clear * (1.0 - coverage * mirrored);
-    let highlight = clear * mix(1.0, (1.0 - mirrored) * (1.0 - mirrored), coverage);
+    let highlight = clear * film_transmission(point.surface.NdotV, point.surface.NdotV, coverage);
     var indirect = vec3(0.0);
     var found_diffuse = false;
 #ifdef LIGHTMAP

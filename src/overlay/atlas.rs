@@ -145,8 +145,10 @@ impl StampAtlas {
 mod tests {
     use bytemuck::Zeroable;
 
+    use super::super::deposit::number_stamps;
     use super::super::{CpuMaps, Splat, Weatherable};
     use super::*;
+    use crate::effect::{EffectTable, StampSource, WeatherEffect};
     use crate::stamps::{Stamp, StampKind, StampOptions, stamps};
 
     fn set(values: &[u32]) -> StampSet {
@@ -230,6 +232,25 @@ mod tests {
         atlas.retire_unless(|first| first != 1);
         assert_eq!(atlas.add(&set(&[500, 501])), None);
         assert_eq!(atlas.add(&set(&[0])), Some(1));
+    }
+
+    #[test]
+    fn what_an_edit_leaves_behind_is_retired() {
+        let mut world = World::new();
+        world.init_resource::<StampAtlas>();
+        world.init_resource::<EffectTable>();
+        let mut schedule = Schedule::default();
+        schedule.add_systems(number_stamps);
+        let after = |kind| {
+            let stamps = StampSource::Kind(kind);
+            let effect = WeatherEffect { stamps, stamp_radius: Some(0.02), ..default() };
+            world.resource_mut::<EffectTable>().insert(Handle::default(), effect);
+            schedule.run(&mut world);
+            let atlas = world.resource::<StampAtlas>();
+            (atlas.sets.len(), atlas.retired.len())
+        };
+        let edits = [StampKind::Splat, StampKind::Drop, StampKind::Splat];
+        assert_eq!(edits.map(after), [(1, 0), (1, 1), (1, 1)]);
     }
 
     #[test]

@@ -90,6 +90,16 @@ mod tests {
     }
 
     #[test]
+    fn a_run_that_cannot_paint_ends_with_an_error() {
+        let mut world = World::new();
+        assert!(check(&world).is_ok());
+        world.init_resource::<SplatStats>();
+        assert!(check(&world).is_ok());
+        world.resource::<SplatStats>().lose(1);
+        assert!(matches!(check(&world), Err(ReplayError::Renderer(_))));
+    }
+
+    #[test]
     fn a_run_whose_device_is_lost_ends_with_an_error_and_whole_files() {
         if std::env::var("WEATHERING_SKIP_GPU").is_ok_and(|value| value == "1") {
             eprintln!("skipped: needs a GPU, and WEATHERING_SKIP_GPU=1");

@@ -134,7 +134,7 @@ fn pack_tiles(
                 let lies_beside = || {
                     (0..TILE_TEXELS).any(|local| {
                         let texel = texel_in(water.size, tile, local);
-                        !geometry.0.lies(geometry.0.gutter_source(texel).unwrap_or(texel))
+                        !geometry.0.lies(texel) && geometry.0.gutter_source(texel).is_none()
                     })
                 };
                 if water.tiles.has(tile, Tiles::WET) {

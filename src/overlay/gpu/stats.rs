@@ -79,7 +79,7 @@ impl SplatStats {
         self.0.dropped.fetch_add(splats as u64, Ordering::Relaxed);
     }
 
-    pub(super) fn lose(&self, splats: usize) {
+    pub(crate) fn lose(&self, splats: usize) {
         self.0.lost.fetch_add(splats as u64, Ordering::Relaxed);
     }
 
