@@ -276,6 +276,12 @@ fn flags_are_the_same_bits_on_both_sides() {
     assert_eq!(in_shader.collect::<Vec<_>>(), in_rust);
 }
 
+#[test]
+fn texels_beside_the_mesh_are_marked_alike_on_both_sides() {
+    let line = format!("const BESIDE: u32 = {:#x}u;", GpuTexelWater::BESIDE);
+    assert!(WET_MAP.lines().any(|other| other == line), "{line}");
+}
+
 /// `SurfaceBatch` is written by encase, too.
 #[test]
 fn a_batch_is_read_as_it_is_written() {

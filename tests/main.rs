@@ -40,6 +40,8 @@ mod fuzz;
 mod gpu {
     /// Small apps that render without a window.
     pub mod app;
+    /// Shaders that do not compile.
+    mod broken;
     /// Exported scenes in a renderer that knows nothing of weathering.
     mod exported;
     /// Ticks and frames.
@@ -51,6 +53,8 @@ mod gpu {
     mod hnat;
     /// What must look the same, and what must not.
     mod images;
+    /// Islands of a map from afar.
+    mod islands;
     /// A device that is lost.
     mod lost;
     /// Maps from afar.

@@ -18,7 +18,7 @@
     shadows,
 }
 #import bevy_weathering::{
-    water_film::{fresnel, WATER_REFLECTANCE},
+    water_film::{film_transmission, fresnel, WATER_REFLECTANCE},
     wet_layers::{
         AMBIENT_COSINE, Point, Through, add_water, blinn_phong, clearness, matter_coefficients, point_from_pbr,
         through_water,
@@ -29,6 +29,9 @@
 
 #ifdef ENVIRONMENT_MAP
 #import bevy_pbr::environment_map
+#ifdef STANDARD_MATERIAL_ANISOTROPY
+#import bevy_pbr::pbr_functions::bend_normal_for_anisotropy
+#endif
 #endif
 #ifdef IRRADIANCE_VOLUME
 #import bevy_pbr::irradiance_volume
@@ -222,7 +225,7 @@ fn apply_wet_lighting(in: PbrInput, water: Water, normal: vec3<f32>) -> vec4<f32
     let mirrored = fresnel(WATER_REFLECTANCE, point.surface.NdotV);
     let clear = clearness(point, AMBIENT_COSINE) * (1.0 - pores * mirrored);
     let spread = clear * (1.0 - coverage * mirrored);
-    let highlight = clear * mix(1.0, (1.0 - mirrored) * (1.0 - mirrored), coverage);
+    let highlight = clear * film_transmission(point.surface.NdotV, point.surface.NdotV, coverage);
     var indirect = vec3(0.0);
     var found_diffuse = false;
 #ifdef LIGHTMAP
@@ -237,7 +240,16 @@ fn apply_wet_lighting(in: PbrInput, water: Water, normal: vec3<f32>) -> vec4<f32
     }
 #endif
 #ifdef ENVIRONMENT_MAP
-    let environment = environment_map::environment_map_light(&input, &ranges, found_diffuse);
+    var from_sky = input;
+#ifdef STANDARD_MATERIAL_ANISOTROPY
+#ifdef PBR_ANISOTROPY_TEXTURE_SUPPORTED
+#ifdef VERTEX_TANGENTS
+    // As Bevy lights the dry matter. Otherwise there are no axes to bend it along.
+    bend_normal_for_anisotropy(&from_sky);
+#endif
+#endif
+#endif
+    let environment = environment_map::environment_map_light(&from_sky, &ranges, found_diffuse);
     indirect += environment.diffuse * (in.diffuse_occlusion * spread);
     indirect += environment.specular * (in.specular_occlusion * highlight);
     let mirror = (coverage + pores) * mirrored;

@@ -3,7 +3,7 @@
 #define_import_path bevy_weathering::wet_map
 
 #import bevy_weathering::drying::{Amounts, evolve, water_look}
-#import bevy_weathering::footprint::axis_taps
+#import bevy_weathering::footprint::{Taps, axis_taps}
 #import bevy_weathering::hnat::wet_tau
 #import bevy_weathering::matter::{TexelMatter, heap_fall, lies, matter_depths, settled_soil}
 #import bevy_weathering::ripples::{ring_slope, RING_SECONDS}
@@ -69,7 +69,7 @@ struct PorousUniform {
 
 // The twin of `GpuTexelWater` in `src/wetting/gpu.rs`.
 struct TexelWater {
-    // Film and absorbed water, mm, two halves.
+    // Film and absorbed water, mm, two halves; BESIDE where neither the mesh lies nor its gutter.
     amounts: u32,
     // Reference tick; 0 if it never was wet.
     tick: u32,
@@ -123,6 +123,9 @@ struct RainRing {
     // Water, nanolitres.
     water_nl: u32,
 }
+
+// Amounts of a texel beside the mesh: no film, with a sign. As in `src/wetting/gpu.rs`.
+const BESIDE: u32 = 0x8000u;
 
 const FLAG_SQRT_K: u32 = 1u;
 const FLAG_SOLID: u32 = 2u;
@@ -211,6 +214,8 @@ fn demand_since(tick: u32) -> vec2<f32> {
 
 // Water at a point as it is held and looks.
 struct Held {
+    // 1 where the mesh or its gutter lies, else 0.
+    there: f32,
     // How wet, how glossy, film in mm.
     look: vec3<f32>,
     // Efflorescence and tide mark, 0..=1.
@@ -238,6 +243,7 @@ fn texel_held(texel: vec2<i32>) -> Held {
     let index = texel_index(texel);
     let stored = state[index];
     var held: Held;
+    held.there = select(1.0, 0.0, stored.amounts == BESIDE);
     let marks = unpack4x8unorm(stored.marks);
     held.marks = marks.xy;
 #ifdef WEATHERED_MATTER
@@ -267,8 +273,17 @@ fn texel_held(texel: vec2<i32>) -> Held {
     return held;
 }
 
-fn mix_held(a: Held, b: Held, part: f32) -> Held {
-    return Held(mix(a.look, b.look, part), mix(a.marks, b.marks, part), mix(a.matter, b.matter, part));
+// A texel that a pixel reads, and its weight.
+struct Tap {
+    texel: vec2<i32>,
+    weight: f32,
+}
+
+// One of the four that a pixel reads. u, v: of `axis_taps`.
+fn tap_of(u: Taps, v: Taps, number: i32) -> Tap {
+    let is_high = vec2(number % 2 == 1, number / 2 == 1);
+    let along = select(1.0 - vec2(u.part, v.part), vec2(u.part, v.part), is_high);
+    return Tap(select(vec2(u.low, v.low), vec2(u.high, v.high), is_high), along.x * along.y);
 }
 
 // What a point holds and how it looks now; bilinear between texels, spread over the pixel where it covers more of them.
@@ -277,9 +292,22 @@ fn held_at(uv: vec2<f32>) -> Held {
     let covered = fwidth(uv) * size;
     let u = axis_taps(uv.x * size, covered.x);
     let v = axis_taps(uv.y * size, covered.y);
-    let upper = mix_held(texel_held(vec2(u.low, v.low)), texel_held(vec2(u.high, v.low)), u.part);
-    let lower = mix_held(texel_held(vec2(u.low, v.high)), texel_held(vec2(u.high, v.high)), u.part);
-    return mix_held(upper, lower, v.part);
+    var sum: Held;
+    for (var i = 0; i < 4; i += 1) {
+        let tap = tap_of(u, v, i);
+        let held = texel_held(tap.texel);
+        // From afar a pixel may reach beyond the gutter of its island: what lies beside it is not dry, but not there.
+        let weight = tap.weight * held.there;
+        sum.there += weight;
+        sum.look += weight * held.look;
+        sum.marks += weight * held.marks;
+        sum.matter += weight * held.matter;
+    }
+    if sum.there <= 0.0 {
+        // An island smaller than that.
+        return texel_held(vec2<i32>(floor(uv * size)));
+    }
+    return Held(1.0, sum.look / sum.there, sum.marks / sum.there, sum.matter / sum.there);
 }
 
 // Depth of snow and soil at a texel, mm, for slopes; below 0 where the mesh does not lie.
@@ -300,12 +328,11 @@ fn heap_falls(uv: vec2<f32>) -> vec2<f32> {
     var sum = vec2(0.0);
     var weights = 0.0;
     for (var i = 0; i < 4; i += 1) {
-        let is_high = vec2(i % 2 == 1, i / 2 == 1);
-        let at = select(vec2(u.low, v.low), vec2(u.high, v.high), is_high);
-        let along = select(1.0 - vec2(u.part, v.part), vec2(u.part, v.part), is_high);
+        let tap = tap_of(u, v, i);
+        let at = tap.texel;
         let here = heap_mm(at);
-        // From afar a pixel may reach beyond the gutter of its island.
-        let weight = select(along.x * along.y, 0.0, here < 0.0);
+        // As in `held_at`.
+        let weight = select(tap.weight, 0.0, here < 0.0);
         let fall = vec2(
             heap_fall(heap_mm(at - vec2(reach.x, 0)), here, heap_mm(at + vec2(reach.x, 0))),
             heap_fall(heap_mm(at - vec2(0, reach.y)), here, heap_mm(at + vec2(0, reach.y))),
@@ -316,17 +343,29 @@ fn heap_falls(uv: vec2<f32>) -> vec2<f32> {
     return sum / max(weights, 1e-6) * size / 2000.0;
 }
 
-// How wet the played map says a point is, 0..=1. Grey g wets at (1 - g)(1 - t_fill), 0 never; drying is that backwards.
+// Most places along each side of a pixel at which it reads a played map.
+const MOST_PLAYED_TAPS: i32 = 4;
+
+// How wet the played map says a point is, 0..=1. Grey g wets at (1 - g)(1 - t_fill), 0 never; drying is that backwards. A mean
+// over what a pixel covers, of how wet it is and not of greys: half of it soaked is not all of it half wet.
 fn played_at(uv: vec2<f32>) -> f32 {
-    let grey = textureSampleLevel(played_map, played_sampler, uv, 0.0).r;
     var time = f32(i32(clock.tick - porous.map_tick)) / porous.map_ticks;
     if has_flag(FLAG_MAP_DRIES) {
         time = 1.0 - time;
     }
-    if grey <= 0.0 {
-        return 0.0;
+    let pixel = fwidth(uv);
+    let texels = pixel * vec2<f32>(textureDimensions(played_map));
+    let covered = max(texels.x, texels.y);
+    let taps = clamp(i32(ceil(covered)), 1, MOST_PLAYED_TAPS);
+    // Maps that have mip maps are read from those for the rest.
+    let level = log2(max(covered / f32(taps), 1.0));
+    var wet = 0.0;
+    for (var i = 0; i < taps * taps; i += 1) {
+        let away = (vec2(f32(i % taps), f32(i / taps)) + 0.5) / f32(taps) - 0.5;
+        let grey = textureSampleLevel(played_map, played_sampler, uv + away * pixel, level).r;
+        wet += select(wet_tau(time, (1.0 - grey) * (1.0 - porous.map_fill), porous.map_fill), 0.0, grey <= 0.0);
     }
-    return wet_tau(time, (1.0 - grey) * (1.0 - porous.map_fill), porous.map_fill);
+    return wet / f32(taps * taps);
 }
 
 // Slopes along u and v of the rings around drops that fell not long ago.

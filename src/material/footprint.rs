@@ -3,8 +3,9 @@
 //! Water and matter are evaluated at the moment they are drawn, from state that has no mip maps. Near by, a pixel lies between
 //! four texels and reads them bilinearly. From afar it covers many: then it still reads four, but those in the middles of the
 //! quarters of what it covers, with equal weights. So it costs the same, there is no jump from one to the other, and wet
-//! spots flicker less as they get smaller than a pixel. It is no mean of all: that would take a pass over the state in every
-//! frame, since it changes with time by itself.
+//! spots flicker less as they get smaller than a pixel. Of the four, those beside the mesh and its gutter do not count: islands
+//! would pale along their borders. It is no mean of all: that would take a pass over the state in every frame, since it changes
+//! with time by itself.
 //!
 //! The function has a twin of the same name in `shaders/common/footprint.wgsl`.
 

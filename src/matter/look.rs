@@ -90,8 +90,8 @@ pub fn pack_matter(
     geometry: &TexelGeometry,
     texel: u32,
 ) -> GpuTexelMatter {
-    let lies = geometry.owner(texel).is_some() || geometry.area_mm2()[texel as usize] > 0.0;
-    let bare = GpuTexelMatter { dust_mud: 0, snow: if lies { GpuTexelMatter::LIES } else { 0 } };
+    let bare =
+        GpuTexelMatter { dust_mud: 0, snow: if geometry.lies(texel) { GpuTexelMatter::LIES } else { 0 } };
     // What is on maps of another size is gone.
     let texels: &[TexelMatter] = if matter.size == geometry.size() { matter.texels() } else { &[] };
     let Some(state) = texels.get(texel as usize).filter(|state| !state.is_clean()) else { return bare };

@@ -282,9 +282,15 @@ fn kind_of(carries: Carries) -> Option<MatterKind> {
     }
 }
 
-/// Gives the stamps of new effects their numbers.
+/// Gives the stamps of new effects their numbers, and what no effect has any more free.
 pub(crate) fn number_stamps(mut effects: ResMut<EffectTable>, mut atlas: ResMut<StampAtlas>) {
-    for (numbers, set) in effects.bypass_change_detection().without_stamps() {
+    let effects = effects.bypass_change_detection();
+    if effects.without_stamps().next().is_none() {
+        return;
+    }
+    let in_use = |first: u32| effects.rows().iter().any(|row| row.stamps.1 > 0 && row.stamps.0 == first);
+    atlas.retire_unless(in_use);
+    for (numbers, set) in effects.without_stamps() {
         match atlas.add(set) {
             Some(first) => *numbers = (first, set.variants.len() as u32),
             None => {

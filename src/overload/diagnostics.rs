@@ -25,6 +25,8 @@ impl OverloadDiagnosticsPlugin {
     pub const PENDING: DiagnosticPath = DiagnosticPath::const_new("weathering/splats/pending");
     /// Splats that had to wait for a later frame so far.
     pub const CARRIED: DiagnosticPath = DiagnosticPath::const_new("weathering/splats/carried");
+    /// Splats that could not be painted so far; see [`SplatStats::lost`].
+    pub const LOST: DiagnosticPath = DiagnosticPath::const_new("weathering/splats/lost");
     /// Ticks that were held so far.
     pub const HELD: DiagnosticPath = DiagnosticPath::const_new("weathering/ticks/held");
     /// Milliseconds that a tick takes, where a [`LiveBudgetPlugin`](super::LiveBudgetPlugin) measures it.
@@ -33,13 +35,14 @@ impl OverloadDiagnosticsPlugin {
     pub const SPEED: DiagnosticPath = DiagnosticPath::const_new("weathering/ticks/speed");
 
     /// All of them.
-    pub const ALL: [DiagnosticPath; 9] = [
+    pub const ALL: [DiagnosticPath; 10] = [
         Self::ALIVE,
         Self::REFUSED,
         Self::MERGED,
         Self::DETAIL,
         Self::PENDING,
         Self::CARRIED,
+        Self::LOST,
         Self::HELD,
         Self::TICK_MS,
         Self::SPEED,
@@ -77,6 +80,7 @@ fn measure(
     if let Some(splats) = splats {
         tell(&Paths::PENDING, splats.pending() as f64);
         tell(&Paths::CARRIED, splats.carried() as f64);
+        tell(&Paths::LOST, splats.lost() as f64);
     }
     if let Some(hold) = hold {
         tell(&Paths::HELD, hold.ticks as f64);

@@ -11,6 +11,7 @@ use bevy::render::render_resource::PollType;
 use bevy::render::renderer::RenderDevice;
 
 use super::ReplayError;
+use crate::overlay::SplatStats;
 
 /// Why nothing is drawn any more.
 #[derive(Resource, Debug, Clone, PartialEq, Eq)]
@@ -38,8 +39,12 @@ pub fn describe_render_error(error: &RenderError) -> String {
 }
 
 /// # Errors
-/// [`ReplayError::Renderer`] once the renderer has failed.
+/// [`ReplayError::Renderer`] once the renderer has failed, or could not paint something.
 pub(super) fn check(world: &World) -> Result<(), ReplayError> {
+    if world.get_resource::<SplatStats>().is_some_and(|stats| stats.lost() > 0) {
+        let why = "a shader that paints splats did not compile, as the log tells";
+        return Err(ReplayError::Renderer(why.into()));
+    }
     match world.get_resource::<RenderFailure>() {
         Some(failure) => Err(ReplayError::Renderer(failure.0.clone())),
         None => Ok(()),
@@ -82,6 +87,16 @@ mod tests {
         assert_eq!(lost, "the graphics device was lost");
         let refused = describe_render_error(&error(ErrorType::Validation, "In a pass\n  no buffer\n"));
         assert_eq!(refused, "the graphics driver refused what it was given (In a pass no buffer)");
+    }
+
+    #[test]
+    fn a_run_that_cannot_paint_ends_with_an_error() {
+        let mut world = World::new();
+        assert!(check(&world).is_ok());
+        world.init_resource::<SplatStats>();
+        assert!(check(&world).is_ok());
+        world.resource::<SplatStats>().lose(1);
+        assert!(matches!(check(&world), Err(ReplayError::Renderer(_))));
     }
 
     #[test]

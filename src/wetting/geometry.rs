@@ -158,6 +158,15 @@ impl TexelGeometry {
         Some(self.layout.owner[texel as usize]).filter(|&owner| owner < STAND_IN)
     }
 
+    /// Whether the mesh lies at a texel. Not in its gutter.
+    #[inline]
+    pub fn lies(&self, texel: u32) -> bool {
+        let TexelLayout { owner, area_mm2, .. } = &*self.layout;
+        let texel = texel as usize;
+        owner.get(texel).is_some_and(|&owner| owner < STAND_IN)
+            || area_mm2.get(texel).is_some_and(|&area| area > 0.0)
+    }
+
     /// What lies on a side of a texel on the mesh, over seams between islands, too. [`Link::Edge`] where the
     /// mesh ends, and on all sides of a texel on which nothing lies.
     ///

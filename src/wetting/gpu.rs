@@ -27,7 +27,7 @@ use crate::overlay::{MapSize, Overlays, TILE_SIZE};
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
 pub struct GpuTexelWater {
-    /// Film (low) and absorbed water, mm, as two `f16`.
+    /// Film (low) and absorbed water, mm, as two `f16`; [`Self::BESIDE`] where the mesh does not lie.
     pub amounts: u32,
     /// Reference tick; 0 if it never was wet.
     pub tick: u32,
@@ -35,6 +35,11 @@ pub struct GpuTexelWater {
     pub bytes: u32,
     /// From the lowest byte: efflorescence, tide mark, how much of the film was to be seen, nearness to a rim.
     pub marks: u32,
+}
+
+impl GpuTexelWater {
+    /// `amounts` where neither the mesh lies nor its gutter: no film, with a sign. From afar such texels are left out.
+    pub const BESIDE: u32 = 0x8000;
 }
 
 /// Texels of a tile.
@@ -181,8 +186,17 @@ fn pack_tiles(
                 packed.clear();
             }
             for tile in 0..water.tiles.flags.len() as u32 {
+                // What lies beside the mesh shows from afar, whether anything near it is wet or not.
+                let lies_beside = || {
+                    (0..TILE_TEXELS).any(|local| {
+                        let texel = texel_in(water.size, tile, local);
+                        !geometry.0.lies(texel) && geometry.0.gutter_source(texel).is_none()
+                    })
+                };
                 if water.tiles.has(tile, Tiles::WET) {
                     water.tiles.touch(tile);
+                } else if lies_beside() {
+                    water.tiles.send(tile);
                 }
             }
         }
@@ -225,6 +239,9 @@ pub(super) fn pack_texel(
     exposure: Option<&Exposure>,
     texel: u32,
 ) -> GpuTexelWater {
+    if !geometry.lies(texel) {
+        return GpuTexelWater { amounts: GpuTexelWater::BESIDE, ..default() };
+    }
     let state = &water.texels[texel as usize];
     let marks = water.marks.get(texel as usize).copied().unwrap_or_default();
     let Marks { efflorescence, tide } = marks;
@@ -365,5 +382,38 @@ mod tests {
         }
         assert_eq!(waiting.tiles, [0, 1, 2, 3, 4]);
         assert_eq!((waiting.texels.len(), waiting.matter.len()), (5 * TILE_TEXELS, 5 * TILE_TEXELS));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::math::Affine3A;
+
+    use super::super::TexelGeometry;
+    use super::*;
+    use crate::collision::MeshTriangles;
+    use crate::overlay::{Weatherable, Wrap};
+
+    #[test]
+    fn what_lies_beside_the_mesh_is_marked_and_holds_nothing() {
+        let corners = [Vec2::ZERO, Vec2::X, Vec2::Y];
+        let triangles = MeshTriangles {
+            positions: vec![corners.map(|at| Vec3::new(at.x, 0.0, at.y))],
+            uvs: vec![corners.map(|at| at * 0.5)],
+            source: vec![0],
+            ..default()
+        };
+        let surface = Weatherable { map_size: 16, wrap_u: Wrap::Clamp, wrap_v: Wrap::Clamp, ..default() };
+        let geometry = TexelGeometry::new(&triangles, &Affine3A::IDENTITY, Vec3::Y, 16, surface.wrap());
+        let mut water = SurfaceWater::new(&surface, geometry.mean_mm2());
+        water.cover(&geometry, 1.0, 0.0, 7);
+        let pack = |texel| pack_texel(&water, &geometry, None, texel);
+        let film_mm = |texel: GpuTexelWater| f16::from_bits(texel.amounts as u16).to_f32();
+        let wet = pack(16 + 2);
+        assert!(wet.tick == 7 && (film_mm(wet) - 1.0).abs() < 0.01, "{wet:?}");
+        for beside in [15, 16 * 12 + 12].map(pack) {
+            assert_eq!(beside, GpuTexelWater { amounts: GpuTexelWater::BESIDE, ..default() });
+            assert_eq!(film_mm(beside), 0.0);
+        }
     }
 }

@@ -103,6 +103,11 @@ impl Tiles {
         Self::set(&mut self.dirty, &mut self.flags[tile as usize], Self::DIRTY, tile);
     }
 
+    /// Has a tile sent as it is, though it never was wet.
+    pub(crate) fn send(&mut self, tile: u32) {
+        Self::set(&mut self.dirty, &mut self.flags[tile as usize], Self::DIRTY, tile);
+    }
+
     pub(crate) fn renew(&mut self, tile: u32) {
         self.flags[tile as usize] |= Self::RENEWED;
     }

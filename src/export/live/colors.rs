@@ -41,7 +41,8 @@ type Coming = (Entity, [Option<Vec<u8>>; 3]);
 pub struct ColorReadback(Arc<Mutex<Vec<Coming>>>);
 
 impl ColorReadback {
-    /// Whether all that fell on surfaces has been painted; what is still to be would be missing. Without a renderer it always has.
+    /// Whether all that fell on surfaces has been painted; what is still to be would be missing, and what is
+    /// [lost](SplatStats::lost) is. Without a renderer it always has.
     pub fn is_painted(world: &mut World) -> bool {
         let Some(pending) = world.get_resource::<SplatStats>().map(SplatStats::pending) else { return true };
         let mut queues = world.query::<&SplatQueue>();

@@ -6,8 +6,9 @@ use super::SplatStats;
 use crate::overlay::{SplatBudget, SplatQueue};
 use crate::schedule::TickHold;
 
-/// Lets no tick begin while as many splats wait as the budget allows: memory stays bounded and no splat is lost. Runs before the
-/// ticks of a frame, which sees what has been painted, and in each tick, which sees what has come.
+/// Lets no tick begin while as many splats wait as the budget allows: memory stays bounded and no splat is lost. Where none can
+/// ever be painted, none waits. Runs before the ticks of a frame, which sees what has been painted, and in each tick, which sees
+/// what has come.
 pub(super) fn hold_ticks(
     budget: Res<SplatBudget>,
     stats: Res<SplatStats>,

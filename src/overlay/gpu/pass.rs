@@ -9,12 +9,13 @@ use bevy::render::render_resource::binding_types::{
     storage_buffer_read_only_sized, storage_buffer_sized, texture_2d, texture_storage_2d, uniform_buffer,
 };
 use bevy::render::render_resource::{
-    BindGroupLayoutDescriptor, BindGroupLayoutEntries, CachedComputePipelineId, ComputePassDescriptor,
-    ComputePipelineDescriptor, PipelineCache, ShaderStages, SpecializedComputePipeline,
-    SpecializedComputePipelines, StorageTextureAccess, TextureFormat, TextureSampleType,
+    BindGroupLayoutDescriptor, BindGroupLayoutEntries, CachedComputePipelineId, CachedPipelineState,
+    ComputePassDescriptor, ComputePipelineDescriptor, PipelineCache, ShaderStages,
+    SpecializedComputePipeline, SpecializedComputePipelines, StorageTextureAccess, TextureFormat,
+    TextureSampleType,
 };
 use bevy::render::renderer::RenderContext;
-use bevy::shader::ShaderDefVal;
+use bevy::shader::{ShaderCacheError, ShaderDefVal};
 
 use super::mips::{MipBatches, MipPipeline};
 use super::prepare::{SplatBatches, SurfaceBatch};
@@ -99,6 +100,11 @@ impl SplatPipeline {
         [self.all, self.rings].iter().all(|&pipeline| cache.get_compute_pipeline(pipeline).is_some())
     }
 
+    /// Whether nothing will ever be painted, unless the shader is edited.
+    pub(super) fn has_failed(&self, cache: &PipelineCache) -> bool {
+        [self.all, self.rings].iter().any(|&pipeline| has_failed(pipeline, cache))
+    }
+
     /// The narrowest pipeline that is ready; all of them paint the same to the bit.
     pub(super) fn painting(
         &self,
@@ -109,6 +115,16 @@ impl SplatPipeline {
         let own = pipelines.specialize(cache, self, kinds);
         if cache.get_compute_pipeline(own).is_some() { own } else { self.all }
     }
+}
+
+/// Whether a pipeline did not compile. What only waits for files has not failed.
+pub(super) fn has_failed(pipeline: CachedComputePipelineId, cache: &PipelineCache) -> bool {
+    matches!(
+        cache.get_compute_pipeline_state(pipeline),
+        CachedPipelineState::Err(
+            ShaderCacheError::ProcessShaderError(_) | ShaderCacheError::CreateShaderModule(_)
+        )
+    )
 }
 
 pub(super) fn init_splat_pipeline(

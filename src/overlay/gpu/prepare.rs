@@ -18,7 +18,7 @@ use super::SplatStats;
 use super::backlog::Backlog;
 use super::maps::Overlays;
 use super::mips::{MipBatches, MipPipeline, SurfaceLevels};
-use super::pass::{SplatKinds, SplatPipeline};
+use super::pass::{SplatKinds, SplatPipeline, has_failed};
 use super::texels::{TexelRows, stamp_texture};
 use crate::overlay::{
     Lying, Splat, SplatBudget, SplatQueue, StampAtlas, SurfaceFrames, TexelFrame, TileBins, TileHeader, Wrap,
@@ -51,6 +51,11 @@ impl PendingSplats {
     /// How many wait, on all surfaces.
     fn len(&self) -> usize {
         self.surfaces.iter().map(|surface| surface.backlog.len()).sum()
+    }
+
+    /// Forgets all that wait.
+    fn clear(&mut self) {
+        self.surfaces.iter_mut().for_each(|surface| surface.backlog.clear());
     }
 }
 
@@ -166,7 +171,7 @@ pub(super) struct StampTexture {
 /// Takes over what has been added to the atlas.
 pub(super) fn extract_stamps(atlas: Extract<Option<Res<StampAtlas>>>, mut stamps: ResMut<StampTexture>) {
     if let Some(atlas) = &*atlas
-        && atlas.len() != stamps.atlas.len()
+        && !atlas.is_same(&stamps.atlas)
     {
         *stamps = StampTexture { atlas: StampAtlas::clone(atlas), texture: None };
     }
@@ -244,10 +249,21 @@ pub(super) fn prepare_splats(
     let SplatBatches { batches, splats, tiles, list, bins, no_frames, no_mask, frame, jobs } = &mut *batches;
     jobs.clear();
     mips.clear();
-    if pending.len() == 0
-        || !pipeline.is_ready(&cache)
-        || cache.get_compute_pipeline(mip_pipeline.pipeline).is_none()
-    {
+    if pending.len() == 0 {
+        return;
+    }
+    if pipeline.has_failed(&cache) || has_failed(mip_pipeline.pipeline, &cache) {
+        // To wait would be in vain, and stop time.
+        error_once!(
+            "a shader that paints splats did not compile, as told above: the weather goes on, but leaves no marks on \
+             surfaces. `SplatStats::lost` counts them."
+        );
+        stats.lose(pending.len());
+        pending.clear();
+        stats.set_pending(0);
+        return;
+    }
+    if !pipeline.is_ready(&cache) || cache.get_compute_pipeline(mip_pipeline.pipeline).is_none() {
         return;
     }
     batches.clear();

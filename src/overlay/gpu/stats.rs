@@ -17,6 +17,7 @@ struct Counters {
     tiles: AtomicU64,
     carried: AtomicU64,
     dropped: AtomicU64,
+    lost: AtomicU64,
     pending: AtomicU64,
 }
 
@@ -53,6 +54,12 @@ impl SplatStats {
         self.0.dropped.load(Ordering::Relaxed)
     }
 
+    /// Splats that could not be painted since a shader of the pass did not compile, which the log tells: 0, or the maps lack
+    /// something. Time goes on.
+    pub fn lost(&self) -> u64 {
+        self.0.lost.load(Ordering::Relaxed)
+    }
+
     /// Splats that wait in the render world now, for whatever reason.
     pub fn pending(&self) -> u64 {
         self.0.pending.load(Ordering::Relaxed)
@@ -70,6 +77,10 @@ impl SplatStats {
 
     pub(super) fn drop_splats(&self, splats: usize) {
         self.0.dropped.fetch_add(splats as u64, Ordering::Relaxed);
+    }
+
+    pub(crate) fn lose(&self, splats: usize) {
+        self.0.lost.fetch_add(splats as u64, Ordering::Relaxed);
     }
 
     pub(super) fn set_pending(&self, splats: usize) {
