@@ -25,6 +25,9 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
         let most = world.resource::<ParticleConfig>().max_alive;
         ui.label(format!("{} not sent: at most {most} may be in flight", counts.refused));
     }
+    if counts.merged > 0 {
+        ui.label(format!("{} not sent: others carry what they would", counts.merged));
+    }
     // Those in the hand and over the scene have panels of their own.
     let mut query =
         world.query_filtered::<(Entity, &Emitter, Option<&Name>), (Without<InHand>, Without<OwnRain>, Without<CopyOf>)>();
