@@ -36,5 +36,6 @@ picture roof_edge 640x480 00030 roof_edge
 picture rain 640x480 00010 rain
 picture dust 640x480 00013 dust
 picture snow 640x480 00015 snow
+picture wash 640x480 00012 wash
 picture mud 640x480 00003 mud
 picture stair 640x480 00020 stair_rain 00050 stair_puddles

@@ -57,8 +57,12 @@ mod gpu {
     mod islands;
     /// A device that is lost.
     mod lost;
+    /// What lies on a surface, and what is painted on it.
+    mod matter;
     /// Maps from afar.
     mod mips;
+    /// What hangs in the air.
+    mod particles;
     /// Lights, cameras, meshes.
     mod places;
     /// Painting.

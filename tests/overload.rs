@@ -142,6 +142,8 @@ fn held_ticks_are_not_lost_time_but_no_time() {
         }
         let world = scene.0.world();
         let (tick, held) = (world.resource::<WeatheringClock>().tick(), world.resource::<TickHold>().ticks);
+        let told = world.resource::<DiagnosticsStore>().get(&OverloadDiagnosticsPlugin::HELD);
+        assert_eq!(told.and_then(|told| told.value()), Some(held as f64));
         let particles: Vec<_> = world.resource::<Particles>().iter().collect();
         (tick, held, particles, accounts(&scene, floor, emitters))
     };

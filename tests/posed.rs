@@ -4,6 +4,7 @@ use std::f32::consts::FRAC_PI_2;
 use std::time::Duration;
 
 use bevy::asset::RenderAssetUsages;
+use bevy::mesh::morph::{MeshMorphWeights, MorphAttributes};
 use bevy::mesh::skinning::{SkinnedMesh, SkinnedMeshInverseBindposes};
 use bevy::mesh::{Indices, PrimitiveTopology, VertexAttributeValues};
 use bevy::prelude::*;
@@ -181,6 +182,36 @@ fn a_mark_lands_where_it_hits_in_the_pose_is_round_there_and_stays_when_it_moves
         shoot(&mut scene, surface, at, along.cross(Vec3::Z));
         assert!(*maps(&scene, surface) == before, "it was hit where it is not any more");
     }
+}
+
+#[test]
+fn a_mark_lands_where_a_morphed_surface_is_and_stays_when_it_goes_back() {
+    // Its target is a metre higher.
+    let mesh = plank();
+    let raised = MorphAttributes::new(Vec3::Y, Vec3::ZERO, Vec3::ZERO);
+    let mesh = {
+        let vertices = mesh.count_vertices();
+        mesh.with_morph_targets(vec![raised; vertices])
+    };
+    let mut scene = Scene::new(60);
+    let surface = scene.surface(mesh, SIZE, glazed(), Transform::default());
+    let weigh = |scene: &mut Scene, weight: f32| {
+        let weights = MeshMorphWeights::Value { weights: vec![weight] };
+        scene.0.world_mut().entity_mut(surface).insert(weights);
+        // The pose follows a frame later.
+        scene.run(1);
+        scene.run(1);
+    };
+    weigh(&mut scene, 0.5);
+    let uv = Vec2::new(0.3, 0.55);
+    // Aslant: at rest it would be hit half a metre, a quarter of its length, farther on.
+    shoot(&mut scene, surface, at_rest(uv) + Vec3::Y * 0.5, Vec3::new(1.0, -1.0, 0.0).normalize());
+    let marks = maps(&scene, surface).clone();
+    assert!(coverage_at(&marks, uv) > 200, "not where it was hit");
+    assert!(painted(&marks).iter().all(|at| (at.x - uv.x).abs() < 0.06), "and nowhere else");
+    weigh(&mut scene, 0.0);
+    scene.run(10);
+    assert!(*maps(&scene, surface) == marks, "the marks have moved on the surface");
 }
 
 #[test]

@@ -1,7 +1,7 @@
-//! How large rain drops are, how fast they fall, and what a drop leaves where it hits.
+//! How large rain drops are, how fast drops and grains fall, and what a drop leaves where it hits.
 //!
-//! Sources: Marshall and Palmer 1948 for the sizes, Atlas et al. 1973 for the speeds, Clanet et al. 2004 for how far a drop
-//! spreads.
+//! Sources: Marshall and Palmer 1948 for the sizes, Atlas et al. 1973 for the speeds of drops, Schiller and Naumann 1935 for
+//! those of grains, Clanet et al. 2004 for how far a drop spreads.
 
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -61,6 +61,26 @@ pub fn fall_speed(diameter_mm: f64) -> f64 {
     (9.65 - 10.3 * (-0.6 * diameter_mm).exp()).max(0.0)
 }
 
+/// Fall speed of a grain of rock in still air, m/s, from its diameter, mm: where its weight is the drag of a ball,
+/// `24/Re (1 + 0.15 Re^0.687)`. Dust, silt and fine sand: up to 0.5 mm; what is coarser falls slower than this says.
+pub fn settling_speed(grain_mm: f64) -> f64 {
+    /// Of rock and of air at 20 °C, kg/m³.
+    const DENSITIES: [f64; 2] = [2650.0, 1.2];
+    /// Viscosity of air, m²/s.
+    const NU: f64 = 1.5e-5;
+    let metres = grain_mm.max(0.0) * 1e-3;
+    // Stokes' law: that of grains so fine that the air around them does not whirl. The others fall slower.
+    let stokes = (DENSITIES[0] / DENSITIES[1] - 1.0) * 9.81 * metres.powi(2) / (18.0 * NU);
+    let (mut low, mut high) = (0.0, stokes);
+    // Halved until no f32 could tell both ends apart.
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        let reynolds = middle * metres / NU;
+        if middle * (1.0 + 0.15 * reynolds.powf(0.687)) < stokes { low = middle } else { high = middle }
+    }
+    high
+}
+
 /// Water in a drop, mm³.
 pub fn drop_mm3(diameter_mm: f32) -> f32 {
     std::f32::consts::FRAC_PI_6 * diameter_mm.powi(3)
@@ -92,6 +112,16 @@ mod tests {
             assert!((fall_speed(mm) - speed).abs() < 0.006, "{mm}: {}", fall_speed(mm));
         }
         assert_eq!(fall_speed(0.05), 0.0);
+    }
+
+    #[test]
+    fn grains_settle_as_fast_as_they_are_coarse() {
+        for (um, speed) in [(20.0, 0.031), (50.0, 0.18), (100.0, 0.58), (200.0, 1.5)] {
+            let settles = settling_speed(um * 1e-3);
+            assert!((settles / speed - 1.0).abs() < 0.04, "{um}: {settles}");
+        }
+        assert_eq!(settling_speed(0.0), 0.0);
+        assert!(settling_speed(100.0).is_finite());
     }
 
     #[test]

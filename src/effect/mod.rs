@@ -32,9 +32,11 @@ pub struct WeatherEffect {
     pub volume_mm3: f32,
     /// What that is.
     pub carries: Carries,
-    /// How large the drops are that it stands for. Their speed is what air slows them down to, if `terminal_speed` is none.
+    /// How large the drops or grains are that it stands for. Their speed is what air slows them down to, if `terminal_speed` is
+    /// none.
     pub drops: DropSizes,
-    /// Speed at which drag balances gravity, in m/s; 0 switches drag (and wind) off. Not given: that of its drops.
+    /// Speed at which drag balances gravity, in m/s; 0 switches drag (and wind) off. Not given: that of its drops
+    /// ([`fall_speed`](drops::fall_speed)) or, of dust, of its grains ([`settling_speed`](drops::settling_speed)).
     pub terminal_speed: Option<f32>,
     /// How fast it is swayed to and fro in still air, m/s; 0..=10. Flakes flutter. Needs drag.
     pub flutter: f32,

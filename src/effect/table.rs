@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use bevy::prelude::*;
 
-use super::WeatherEffect;
-use super::drops::{SIZE_CLASSES, fall_speed};
+use super::drops::{SIZE_CLASSES, fall_speed, settling_speed};
+use super::{Carries, WeatherEffect};
 use crate::stamps::StampSet;
 
 /// Which row of the [`EffectTable`] a particle belongs to.
@@ -21,6 +21,8 @@ pub struct EffectRow {
     pub effect: Option<WeatherEffect>,
     /// Diameters of its drops by size class, mm.
     pub diameters_mm: [f32; SIZE_CLASSES],
+    /// How fast those fall in still air, m/s.
+    terminal_speeds: [f32; SIZE_CLASSES],
     /// Numbers of its stamps in the [`StampAtlas`](crate::overlay::StampAtlas): the first, and how many
     /// variants there are.
     pub stamps: (u32, u32),
@@ -30,11 +32,24 @@ pub struct EffectRow {
 
 impl EffectRow {
     fn new(handle: Handle<WeatherEffect>) -> Self {
-        Self { handle, effect: None, diameters_mm: [0.0; SIZE_CLASSES], stamps: (0, 0), stamp_set: None }
+        let none = [0.0; SIZE_CLASSES];
+        Self {
+            handle,
+            effect: None,
+            diameters_mm: none,
+            terminal_speeds: none,
+            stamps: (0, 0),
+            stamp_set: None,
+        }
     }
 
     fn set(&mut self, effect: WeatherEffect) {
         self.diameters_mm = effect.drops.diameters_mm();
+        self.terminal_speeds = self.diameters_mm.map(|mm| match (effect.terminal_speed, effect.carries) {
+            (Some(given), _) => given,
+            (None, Carries::Dust) => settling_speed(f64::from(mm)) as f32,
+            (None, Carries::Water | Carries::Mud(_) | Carries::Snow) => fall_speed(f64::from(mm)) as f32,
+        });
         let source = |effect: &WeatherEffect| (effect.stamps.clone(), effect.stamp_set.clone());
         // Stamps are not made again with every other edit.
         if self.effect.as_ref().is_none_or(|old| source(old) != source(&effect)) {
@@ -53,8 +68,7 @@ impl EffectRow {
 
     /// Speed at which drag balances gravity, m/s, for drops of a class; 0 is no drag.
     pub fn terminal_speed(&self, class: usize) -> f32 {
-        let given = self.effect.as_ref().and_then(|effect| effect.terminal_speed);
-        given.unwrap_or_else(|| fall_speed(f64::from(self.diameters_mm[class])) as f32)
+        self.terminal_speeds[class]
     }
 }
 
@@ -177,6 +191,25 @@ mod tests {
         assert_eq!(numbered(&mut table), 1);
         table.insert(Handle::default(), WeatherEffect::default());
         assert_eq!((numbered(&mut table), table.rows()[0].stamps), (0, (0, 0)));
+    }
+
+    #[test]
+    fn drops_and_grains_fall_by_laws_of_their_own_unless_a_speed_is_given() {
+        use crate::effect::{DropSizes, ShippedEffect};
+
+        let mut table = EffectTable::default();
+        let mut speed = |effect: WeatherEffect| {
+            table.insert(Handle::default(), effect).unwrap();
+            table.rows()[0].terminal_speed(0)
+        };
+        let of = |carries, mm| WeatherEffect { carries, drops: DropSizes::Same(mm), ..default() };
+        assert!((speed(of(Carries::Water, 2.0)) - 6.55).abs() < 0.01);
+        let [fine, coarse] = [0.02, 0.1].map(|mm| speed(of(Carries::Dust, mm)));
+        assert!((fine - 0.031).abs() < 0.001 && (coarse - 0.58).abs() < 0.01, "{fine} {coarse}");
+        assert_eq!(speed(WeatherEffect { terminal_speed: Some(0.5), ..of(Carries::Dust, 0.1) }), 0.5);
+        // Grains of 50 micrometres.
+        let dust = speed(ShippedEffect::named("dust").unwrap().read().unwrap());
+        assert!((dust - 0.18).abs() < 0.005, "{dust}");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::frames::{FramesWork, SurfaceFrames, measure_frames, release_frames};
 use super::site::Site;
-use super::stamping::{splat_from_impact, unit_hash};
+use super::stamping::{patch_radius, splat_from_impact, unit_hash};
 use super::{MapLoss, MapSize, SizeMaps, Splat, StampAtlas, StampSpace, TexelArea, Weatherable, pool};
 use crate::clock::WeatheringClock;
 use crate::collision::{DeformingCollider, Impact, Impacts, SurfaceCollider};
@@ -205,18 +205,17 @@ pub fn deposit_splats(
             .and_then(|(frames, transform)| Site::of(impact, &frames.0, transform, deforming));
         let splat = splat_from_impact(impact, row, effect, map, site.as_ref(), clock.tick(), water_nl);
         queue.push(splat);
+        let (center, radius) = (splat.center, patch_radius(impact, row, effect, size.texels()));
         if let Some(mut matter) = matter
             && let Some(kind) = kind_of(effect.carries)
             && solid_nl > 0
         {
-            let Splat { center, radius, .. } = splat;
             matter.0.push(Deposit { center, radius, kind, volume_nl: solid_nl });
         }
         if let Some(mut drops) = drops
             && splat.water_nl > 0
         {
             let speed_mm = (impact.velocity.length() * 1000.0) as u32;
-            let Splat { center, radius, water_nl, .. } = splat;
             drops.0.push(Drop { center, radius, water_nl, speed_mm, source });
         }
     }

@@ -31,6 +31,26 @@ fn radius(impact: &Impact, effect: &WeatherEffect, row: &EffectRow) -> f32 {
     own * (1.0 + effect.stamp_radius_jitter * signed_hash(impact.sequence.0))
 }
 
+/// How much longer than wide the mark of an impact is: what flies in aslant is drawn out along its flight.
+fn stretch(impact: &Impact, effect: &WeatherEffect) -> f32 {
+    let steepness = impact.velocity.normalize_or_zero().dot(impact.normal).abs();
+    (1.0 / steepness.max(0.05)).min(1.0 + effect.stamp_stretch)
+}
+
+/// Half the width and height, 1/256 texel, of the patch of a map with `size` texels along each side over which an impact's water,
+/// dust or snow is shared out: of the box around its mark. The mark is an ellipse, the patch lies straight on the map: so it is
+/// drawn out as the mark is where that lies along u or v, and wider than it in between.
+pub(super) fn patch_radius(impact: &Impact, row: &EffectRow, effect: &WeatherEffect, size: u32) -> [i32; 2] {
+    let own = radius(impact, effect, row);
+    let long = own * stretch(impact, effect);
+    let flight = impact.velocity.reject_from(impact.normal).normalize_or_zero();
+    let reach = impact.along.map(|axis| {
+        let along = flight.dot(axis).clamp(-1.0, 1.0).powi(2);
+        (own * own * (1.0 - along) + long * long * along).sqrt()
+    });
+    Splat::radius_from_uv(impact.uv_per_metre * Vec2::from(reach), size)
+}
+
 /// Axes of a stamp on a surface: the first two lie in it, the third is the normal of its front.
 struct Axes {
     s: Vec3,
@@ -70,9 +90,7 @@ pub(super) fn splat_from_impact(
     water_nl: u32,
 ) -> Splat {
     let own = radius(impact, effect, row);
-    // What flies in aslant is drawn out along its flight.
-    let steepness = impact.velocity.normalize_or_zero().dot(impact.normal).abs();
-    let stretch = (1.0 / steepness.max(0.05)).min(1.0 + effect.stamp_stretch);
+    let stretch = stretch(impact, effect);
     let long = own * stretch;
     let [r, g, b] = effect.diffuse.color;
     let [reflectance, smoothness, unused] = effect.specular.color;
@@ -235,6 +253,24 @@ mod tests {
         assert_eq!(long.radius, [16 * 256; 2]);
         assert_eq!(long.row_t, [1024, 0, 0]);
         assert_eq!((long.row_s[0], long.row_s[1].abs()), (0, 2048));
+    }
+
+    #[test]
+    fn water_is_shared_out_over_a_patch_that_is_drawn_out_along_the_flight_and_no_wider() {
+        let effect = WeatherEffect { stamp_stretch: 1.0, ..paint(0.25) };
+        let mut table = EffectTable::default();
+        table.insert(Handle::default(), effect);
+        let row = &table.rows()[0];
+        let patch = |velocity: Vec3| {
+            let effect = row.effect.as_ref().unwrap();
+            patch_radius(&impact(velocity), row, effect, 64).map(|radius| radius as f32 / 256.0)
+        };
+        assert_eq!(patch(Vec3::NEG_Y), [8.0; 2]);
+        assert_eq!(patch(Vec3::new(3.0, -1.0, 0.0)), [16.0, 8.0]);
+        assert_eq!(patch(Vec3::new(0.0, -1.0, -3.0)), [8.0, 16.0]);
+        // Between the axes: half of the squares of both, 12.6.
+        let between = patch(Vec3::new(3.0, -1.0, 3.0));
+        assert!(between.iter().all(|along| (along - 12.65).abs() < 0.02), "{between:?}");
     }
 
     #[test]

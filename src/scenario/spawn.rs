@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use bevy::asset::LoadState;
 use bevy::camera::Exposure;
+use bevy::core_pipeline::prepass::DepthPrepass;
 use bevy::gltf::GltfAssetLabel;
 use bevy::light::{CascadeShadowConfigBuilder, EnvironmentMapLight, Skybox};
 use bevy::prelude::*;
@@ -260,6 +261,8 @@ fn spawn_view(
         Name::new("camera"),
         Camera3d::default(),
         Msaa::Sample4,
+        // Particles fade into what is close behind them.
+        DepthPrepass,
         Exposure { ev100: scenario.camera.ev100 },
         Projection::from(PerspectiveProjection { fov: scenario.camera.fov_deg.to_radians(), ..default() }),
         ScenarioCamera { keys: camera_keys(scenario) },

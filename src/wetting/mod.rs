@@ -32,6 +32,7 @@ mod geometry;
 pub mod gpu;
 mod grid;
 mod gutters;
+mod islands;
 mod links;
 pub mod look;
 mod marks;

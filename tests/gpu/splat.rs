@@ -1,5 +1,6 @@
 //! The compute pass against the plain loop: not one bit may differ.
 
+use bevy::diagnostic::DiagnosticsStore;
 use bevy::prelude::*;
 use bevy::render::gpu_readback::Readback;
 use bevy_weathering::collision::MeshTriangles;
@@ -8,7 +9,7 @@ use bevy_weathering::overlay::{
     CpuMaps, Overlays, RainRing, Splat, SplatBudget, SplatQueue, SplatStats, StampAtlas, SurfaceFrames,
     Weatherable, Wrap,
 };
-
+use bevy_weathering::overload::OverloadDiagnosticsPlugin;
 use bevy_weathering::stamps::StampKind;
 
 use super::app::{app, read_back, update, update_until};
@@ -295,6 +296,11 @@ fn what_is_beyond_the_budget_is_painted_in_the_next_frames_and_in_order() {
         // Each waits once, and all but those of the first frame do.
         assert!(stats.carried() - carried <= 430 && (!is_cut || stats.carried() - carried >= 430 - most));
     }
+    // Bevy's diagnostics say the same.
+    update(&mut app);
+    let told = |path| app.world().resource::<DiagnosticsStore>().get(&path).and_then(|told| told.value());
+    assert_eq!(told(OverloadDiagnosticsPlugin::CARRIED), Some(stats.carried() as f64));
+    assert_eq!(told(OverloadDiagnosticsPlugin::PENDING), Some(0.0));
     for (entity, reference) in &references {
         let maps = maps_of(&mut app, *entity, &surface);
         assert!(maps == *reference);

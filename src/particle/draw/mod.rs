@@ -6,7 +6,9 @@
 //! the eye: along what its particle flies in the [exposure](crate::effect::ParticleLook::exposure) of its effect, or, of
 //! what stands still, round itself. It shows a sprite that was made in code, lit by the first directional
 //! light, through it or from its side, and by what is all around. Quads thinner than a pixel are widened and made as
-//! much fainter, so that they do not flicker. Behind the particles come the [`Splashes`] of those that hit.
+//! much fainter, so that they do not flicker. For a camera with a
+//! [`DepthPrepass`](bevy::core_pipeline::prepass::DepthPrepass) they fade into what is close behind them, over half their
+//! width, in place of ending there in a hard edge. Behind the particles come the [`Splashes`] of those that hit.
 //!
 //! Not here: shadows of and on particles, point lights, and an order from back to front.
 

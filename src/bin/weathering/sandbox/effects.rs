@@ -3,9 +3,12 @@
 
 use bevy::prelude::*;
 use bevy_egui::egui;
-use bevy_weathering::effect::{Carries, DropSizes, EffectTable, ShippedEffect, WeatherEffect};
+use bevy_weathering::effect::{
+    Carries, DropSizes, EffectTable, ShippedEffect, Sprite, StampSource, StampTurn, WeatherEffect,
+};
 use bevy_weathering::emitter::Emitter;
 use bevy_weathering::record::Recording;
+use bevy_weathering::stamps::StampKind;
 
 use super::theme;
 use super::ui::{AddPanel, Place};
@@ -168,6 +171,7 @@ fn edit(ui: &mut egui::Ui, effect: &mut WeatherEffect) {
     number(ui, "gravity", &mut effect.gravity_scale, (-2.0, 2.0), "Multiplies gravity");
     number(ui, "flutter, m/s", &mut effect.flutter, (0.0, 10.0), "Swaying in still air");
     ui.heading("The mark it leaves");
+    stamps(ui, effect);
     let mut is_given = effect.stamp_radius.is_some();
     if ui.checkbox(&mut is_given, "own radius").changed() {
         effect.stamp_radius = is_given.then_some(0.02);
@@ -186,6 +190,14 @@ fn edit(ui: &mut egui::Ui, effect: &mut WeatherEffect) {
         });
     }
     ui.heading("How a particle looks");
+    const SPRITES: [(Sprite, &str); 5] = [
+        (Sprite::Streak, "streak"),
+        (Sprite::Drop, "drop"),
+        (Sprite::Flake, "flake"),
+        (Sprite::Grain, "grain"),
+        (Sprite::Clod, "clod"),
+    ];
+    choice(ui, &mut effect.look.sprite, &SPRITES);
     ui.horizontal(|ui| {
         color_and_opacity(ui, &mut effect.look.color);
         ui.label("colour, opacity");
@@ -193,6 +205,40 @@ fn edit(ui: &mut egui::Ui, effect: &mut WeatherEffect) {
     number(ui, "width, m", &mut effect.look.width, (0.0, 0.1), "Of the streak");
     number(ui, "exposure, s", &mut effect.look.exposure, (0.0, 0.1), "How long the shutter is open");
     number(ui, "crown, m", &mut effect.look.splash, (0.0, 0.2), "Height of the splash");
+}
+
+/// One of some values, by their names.
+fn choice<T: PartialEq + Copy>(ui: &mut egui::Ui, value: &mut T, all: &[(T, &str)]) {
+    ui.horizontal_wrapped(|ui| {
+        for &(other, name) in all {
+            ui.selectable_value(value, other, name);
+        }
+    });
+}
+
+/// Shapes of the marks, and how they are turned.
+fn stamps(ui: &mut egui::Ui, effect: &mut WeatherEffect) {
+    let before = effect.stamps.clone();
+    ui.horizontal_wrapped(|ui| {
+        ui.selectable_value(&mut effect.stamps, StampSource::Dome, "dome");
+        for kind in StampKind::ALL {
+            ui.selectable_value(&mut effect.stamps, StampSource::Kind(kind), kind.name());
+        }
+        // What has been read from files can be left for another, but not come back to.
+        if matches!(before, StampSource::Images { .. }) {
+            ui.selectable_value(&mut effect.stamps, before.clone(), "images");
+        }
+    });
+    if effect.stamps != before {
+        // Those that it had are of the other shape; new ones are made where it is used.
+        effect.stamp_set = None;
+    }
+    const TURNS: [(StampTurn, &str); 3] = [
+        (StampTurn::Random, "turned at random"),
+        (StampTurn::Flight, "along the flight"),
+        (StampTurn::Downhill, "downhill"),
+    ];
+    choice(ui, &mut effect.stamp_turn, &TURNS);
 }
 
 fn carries(ui: &mut egui::Ui, carries: &mut Carries) {

@@ -29,6 +29,9 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
         let most = world.resource::<ParticleConfig>().max_alive;
         ui.label(format!("{} not sent: at most {most} may be in flight", counts.refused));
     }
+    if counts.merged > 0 {
+        ui.label(format!("{} not sent: others carry what they would", counts.merged));
+    }
     added::show(ui, world);
     let mut query = world.query_filtered::<(Entity, &Emitter, Option<&Name>), Listed>();
     let recording = world.get_resource::<Recording>();

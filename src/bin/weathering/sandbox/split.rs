@@ -8,6 +8,7 @@
 
 use bevy::camera::visibility::RenderLayers;
 use bevy::camera::{Exposure, Viewport};
+use bevy::core_pipeline::prepass::DepthPrepass;
 use bevy::light::{EnvironmentMapLight, Skybox};
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
@@ -155,6 +156,7 @@ fn add_camera(world: &mut World) {
         SceneEntity,
         Name::new("second camera"),
         Camera3d::default(),
+        DepthPrepass,
         camera,
         projection,
         msaa,
