@@ -129,32 +129,3 @@ fn the_bunny_shows_no_seam() {
         assert!(mean_on_map > 4.0 * mean && seen_on_map > 0.1, "{mean_on_map} {seen_on_map}");
     }
 }
-
-#[test]
-fn what_lies_beside_on_the_map_alone_stays_dry() {
-    // Two squares of a metre, ten metres apart, and two texels apart on a map of 64.
-    const MAP: u32 = 64;
-    let mut mesh = MeshTriangles::default();
-    for (along, column) in [(0.0, 4.0), (10.0, 30.0)] {
-        for corners in [[[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]], [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]] {
-            mesh.positions.push(corners.map(|[x, z]| Vec3::new(x + along, 0.0, z)));
-            mesh.uvs.push(corners.map(|[x, z]| Vec2::new(column + 24.0 * x, 8.0 + 24.0 * z) / MAP as f32));
-        }
-    }
-    for (column, row) in [(26, 20), (31, 20), (27, 30)] {
-        let mut scene = Scene::new(60);
-        let glazed = PorousMaterial { capacity_mm: 0.0, retained_mm: 1000.0, ..default() };
-        let surface = scene.surface(mesh_of(&mesh), MAP, glazed, Transform::default());
-        let uv = (Vec2::new(column as f32, row as f32) + 0.5) / MAP as f32;
-        scene.pour(surface, uv, 10, 1_000_000);
-        scene.run(2);
-        let water = scene.water(surface);
-        let on_its_square = |texel: usize| (texel as u32 % MAP < 29) == (column < 29);
-        let (mut here, mut there) = (0, 0);
-        for (texel, held) in water.texels().iter().enumerate() {
-            *(if on_its_square(texel) { &mut here } else { &mut there }) += held.total();
-        }
-        assert_eq!((here, there), (water.ledger().received, 0), "{column} {row}");
-        assert!(here > 0);
-    }
-}

@@ -51,9 +51,6 @@ pub(crate) fn deposit(
     let columns = &mut scratch.columns;
     columns.clear();
     columns.extend(stamp.texels(0, size, wrap).map(|x| (x, axis_coverage(axes[0], x as i32))));
-    let [x, y] = deposit.center.map(|middle| (middle >> 8).clamp(0, size as i32 - 1) as u32);
-    let hit = y * size + x;
-    let home = now.geometry.home(hit).unwrap_or(hit);
     let mut beside = 0;
     for y in stamp.texels(1, size, wrap) {
         let in_row = share(deposit.volume_nl, axis_coverage(axes[1], y as i32));
@@ -62,7 +59,7 @@ pub(crate) fn deposit(
             if nl == 0 {
                 continue;
             }
-            match now.geometry.under_stamp(home, y * size + x, wrap) {
+            match now.geometry.stand_in(y * size + x) {
                 Some(texel) => put(water, matter, now, weather, deposit.kind, texel, nl),
                 None => beside += nl,
             }
@@ -70,6 +67,9 @@ pub(crate) fn deposit(
     }
     if beside > 0 {
         // To the texel that was hit.
+        let [x, y] = deposit.center.map(|middle| (middle >> 8).clamp(0, size as i32 - 1) as u32);
+        let under = y * size + x;
+        let home = now.geometry.stand_in(under).unwrap_or(under);
         put(water, matter, now, weather, deposit.kind, home, beside);
     }
 }

@@ -189,11 +189,6 @@ impl<'a> Finder<'a> {
             || self.is_near(place, texel, SAME_TEXEL_REACHES)
     }
 
-    /// Whether two texels are owned and lie as near to each other in space as neighbours do.
-    pub(super) fn lie_side_by_side(&self, texel: u32, other: u32) -> bool {
-        self.place(texel).is_some_and(|place| self.is_near(&place, other, NEIGHBOUR_REACHES))
-    }
-
     /// Whether an owned texel lies within so many reaches of a place, in space.
     fn is_near(&self, place: &Place, texel: u32, reaches: f64) -> bool {
         let Some(other) = self.place(texel) else { return false };

@@ -8,7 +8,6 @@ use super::Units;
 use super::finder::Finder;
 use super::grid::Grid;
 use super::gutters::Gutters;
-use super::islands::{Islands, Ways};
 use super::links::Links;
 use super::ownership::{NOBODY, Ownership};
 use super::points::front_normals;
@@ -48,7 +47,6 @@ pub(crate) struct TexelLayout {
     owner: Vec<u32>,
     links: Links,
     gutters: Gutters,
-    islands: Islands,
     /// A tile, and another with texels that show what the first one holds; ascending.
     gutter_tiles: Vec<(u32, u32)>,
     /// Length of a mean texel, metres, for those without a triangle.
@@ -72,7 +70,6 @@ impl TexelGeometry {
         let owners = Ownership::new(triangles, grid);
         let finder = Finder::new(grid, &surface, &owners);
         let (links, mut gutters) = (Links::new(&finder), Gutters::new(&finder));
-        let mut islands = Islands::new(&finder, &links);
         let above_origin =
             |texel: u32| finder.place(texel).map(|place| surface.in_space(&place).dot(up.as_dvec3()) as f32);
         let heights = (0..grid.texels() as u32).map(above_origin);
@@ -87,10 +84,7 @@ impl TexelGeometry {
         let facing = normals.iter().map(|normal| normal.dot(up));
         let slopes = Slopes::new(heights, &owners.triangle, facing, lengths.collect());
         let mut owner = owners.triangle;
-        for (texel, other, from) in gutters.take_stand_ins() {
-            owner[texel as usize] = STAND_IN | other;
-            islands.add_gutter(texel, from);
-        }
+        gutters.take_stand_ins().for_each(|(texel, other)| owner[texel as usize] = STAND_IN | other);
         let layout = TexelLayout {
             size,
             area_mm2: areas.mm2,
@@ -98,7 +92,6 @@ impl TexelGeometry {
             gutter_tiles: gutters.tiles(size),
             links,
             gutters,
-            islands,
             mean_length,
             owner,
         };
@@ -203,25 +196,6 @@ impl TexelGeometry {
         }
     }
 
-    /// The texel that gets what a stamp round `home` leaves at a texel of the image: that one or its [stand-in](Self::stand_in) on
-    /// the island of `home`; on another island, which is another place, the one to which a way of as many columns and rows
-    /// over the mesh leads. None farther out than stand-ins are. `home`: the texel that was hit, or next to it; `wrap`: what lies
-    /// beyond the edges of the map.
-    #[inline]
-    pub(crate) fn under_stamp(&self, home: u32, texel: u32, wrap: [Wrap; 2]) -> Option<u32> {
-        if self.layout.islands.are_one(home, texel) {
-            return self.stand_in(texel);
-        }
-        Some(Ways::new(self, wrap).end(home, texel))
-    }
-
-    /// The owned texel for one that was hit: itself or, in a gutter, the nearest on the island that it belongs to; else one that
-    /// [stands in](Self::stand_in) for it. None far from all islands.
-    pub(crate) fn home(&self, texel: u32) -> Option<u32> {
-        let beside = || self.gutter_source(texel).filter(|&other| self.layout.islands.are_one(texel, other));
-        self.owner(texel).map(|_| texel).or_else(beside).or_else(|| self.stand_in(texel))
-    }
-
     /// For a texel that nobody owns but that lies within 2 columns and 2 rows of one that somebody does: the
     /// nearest such texel in the image. None for all others.
     pub fn gutter_source(&self, texel: u32) -> Option<u32> {
@@ -296,7 +270,6 @@ impl TexelGeometry {
             + layout.owner.capacity() * size_of::<u32>()
             + layout.links.bytes()
             + layout.gutters.bytes()
-            + layout.islands.bytes()
             + self.slopes.bytes()
     }
 }

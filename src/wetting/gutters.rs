@@ -12,8 +12,8 @@ const SOURCE_TEXELS: i32 = 2;
 
 /// Who takes the place of texels that no triangle owns.
 pub(super) struct Gutters {
-    /// A texel, the owned one that continues the surface there, and that of the border it was reached from; ascending.
-    stand_ins: Vec<(u32, u32, u32)>,
+    /// A texel, and the owned one that continues the surface there; ascending.
+    stand_ins: Vec<(u32, u32)>,
     /// A texel, and the owned one nearest to it in the image; ascending.
     sources: Vec<(u32, u32)>,
 }
@@ -72,8 +72,7 @@ impl Gutters {
             }
             next.sort_unstable_by_key(|reached| reached.texel);
             for reached in &next {
-                let stand_in = finder.stand_in(reached.from, reached.offset);
-                gutters.stand_ins.push((reached.texel, stand_in, reached.from));
+                gutters.stand_ins.push((reached.texel, finder.stand_in(reached.from, reached.offset)));
                 // No ring beyond that of the corners has a part in the square.
                 if number <= 2 * SOURCE_TEXELS
                     && let Some(source) = nearest_in_image(finder, reached.texel)
@@ -83,15 +82,15 @@ impl Gutters {
             }
             ring = next;
         }
-        gutters.stand_ins.sort_unstable();
-        gutters.sources.sort_unstable();
-        gutters.sources.shrink_to_fit();
+        for list in [&mut gutters.stand_ins, &mut gutters.sources] {
+            list.sort_unstable();
+            list.shrink_to_fit();
+        }
         gutters
     }
 
-    /// Unowned texels, the owned ones that continue the surface there, and those of the border they were reached from; afterwards
-    /// there are none.
-    pub(super) fn take_stand_ins(&mut self) -> impl Iterator<Item = (u32, u32, u32)> + use<> {
+    /// Unowned texels, and the owned ones that continue the surface there; afterwards there are none.
+    pub(super) fn take_stand_ins(&mut self) -> impl Iterator<Item = (u32, u32)> + use<> {
         std::mem::take(&mut self.stand_ins).into_iter()
     }
 
@@ -102,8 +101,7 @@ impl Gutters {
 
     /// Memory held, bytes.
     pub(super) fn bytes(&self) -> usize {
-        self.stand_ins.capacity() * size_of::<(u32, u32, u32)>()
-            + self.sources.capacity() * size_of::<(u32, u32)>()
+        (self.stand_ins.capacity() + self.sources.capacity()) * size_of::<(u32, u32)>()
     }
 }
 

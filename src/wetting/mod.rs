@@ -32,7 +32,6 @@ mod geometry;
 pub mod gpu;
 mod grid;
 mod gutters;
-mod islands;
 mod links;
 pub mod look;
 mod marks;

@@ -40,8 +40,8 @@ pub(crate) struct SoakScratch {
     wetted: Vec<(u32, u32)>,
 }
 
-/// Puts the drops of a tick on the surface: to each texel its share of their stamps. What would fall beside the island that was
-/// hit goes to the texel that continues it there, across the seam, or to the one that was hit.
+/// Puts the drops of a tick on the surface: to each texel its share of their stamps. What would fall beside the surface's
+/// islands goes to the texel that continues it there, across the seam, or to the one that was hit.
 pub(crate) fn soak(
     water: &mut SurfaceWater,
     now: &Now,
@@ -54,10 +54,10 @@ pub(crate) fn soak(
         return;
     }
     let SoakScratch { columns, arrivals, hits, wetted } = scratch;
-    let (size, wrap) = (water.size, water.wrap);
+    let size = water.size;
     let to_texel = |[x, y]: [u32; 2], parcel: Parcel| {
         let under = y * size + x;
-        match now.geometry.under_stamp(parcel.home, under, wrap).unwrap_or(parcel.home) {
+        match now.geometry.stand_in(under).unwrap_or(parcel.home) {
             texel if texel == under => [x, y],
             other => [other % size, other / size],
         }
@@ -70,7 +70,7 @@ pub(crate) fn soak(
             hits.push((hit_texel(now, drop, size), drop.source));
         }
     }
-    arrivals.share_out(size, wrap, to_texel);
+    arrivals.share_out(size, water.wrap, to_texel);
     arrivals.drain(|[x, y], parcel| {
         let texel = y * size + x;
         if water.origins.is_kept() {
@@ -146,11 +146,11 @@ fn put(
     }
 }
 
-/// The texel that was hit or, if its middle is not on the surface, the one beside it that is.
+/// The texel that was hit or, if the middle of the stamp is not on the surface, the one beside it that is.
 fn hit_texel(now: &Now, drop: &Drop, size: u32) -> u32 {
     let [x, y] = drop.center.map(|middle| (middle >> 8).clamp(0, size as i32 - 1) as u32);
     let under = y * size + x;
-    now.geometry.home(under).unwrap_or(under)
+    now.geometry.stand_in(under).unwrap_or(under)
 }
 
 /// What has got water may run and spread. `tile`: of the texel.
