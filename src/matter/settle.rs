@@ -1,7 +1,8 @@
 //! Dust, mud and snow that come: shared out among the texels under their stamps, as water is.
 //!
 //! The shares are those of [`soak`](crate::wetting): differences of the stamp's integral, so that a particle's nanolitres are
-//! on the surface to the last, across seams and beside islands, too. Dust that falls on what is wet is bound there and then;
+//! on the surface to the last, across seams and beside islands, too; nothing of it comes to an island that lies beside in the
+//! image alone. Dust that falls on what is wet is bound there and then;
 //! what falls on dry ground, or on snow, stays loose. Snow is `snow`'s to say.
 
 use super::snow::arrive;
@@ -11,7 +12,7 @@ use super::{MatterScratch, SurfaceMatter};
 use crate::overlay::Splat;
 use crate::overlay::kernel::{axis_coverage, share};
 use crate::weather::Weather;
-use crate::wetting::{Now, SurfaceWater};
+use crate::wetting::{Now, SurfaceWater, texel_under};
 
 /// Film, mm, from which on dust is wetted through.
 pub const WET_FILM_MM: f64 = 0.005;
@@ -51,6 +52,10 @@ pub(crate) fn deposit(
     let columns = &mut scratch.columns;
     columns.clear();
     columns.extend(stamp.texels(0, size, wrap).map(|x| (x, axis_coverage(axes[0], x as i32))));
+    let under = texel_under(deposit.center, size);
+    // The texel that was hit.
+    let home = now.geometry.stand_in(under).unwrap_or(under);
+    let island = now.geometry.island_to_keep_to(under, stamp.span(0), stamp.span(1));
     let mut beside = 0;
     for y in stamp.texels(1, size, wrap) {
         let in_row = share(deposit.volume_nl, axis_coverage(axes[1], y as i32));
@@ -59,17 +64,18 @@ pub(crate) fn deposit(
             if nl == 0 {
                 continue;
             }
-            match now.geometry.stand_in(y * size + x) {
+            let over = y * size + x;
+            let texel = match island {
+                None => now.geometry.stand_in(over),
+                Some(island) => Some(now.geometry.on_island(island, over, home)),
+            };
+            match texel {
                 Some(texel) => put(water, matter, now, weather, deposit.kind, texel, nl),
                 None => beside += nl,
             }
         }
     }
     if beside > 0 {
-        // To the texel that was hit.
-        let [x, y] = deposit.center.map(|middle| (middle >> 8).clamp(0, size as i32 - 1) as u32);
-        let under = y * size + x;
-        let home = now.geometry.stand_in(under).unwrap_or(under);
         put(water, matter, now, weather, deposit.kind, home, beside);
     }
 }
@@ -121,9 +127,15 @@ fn is_wet(water: &mut SurfaceWater, now: &Now, texel: u32) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::TexelMatter;
     use super::super::test_world::{Ground, Place, assert_balanced};
     use super::*;
+    use crate::collision::MeshTriangles;
     use crate::material::PorousMaterial;
+    use crate::overlay::Wrap;
+    use crate::wetting::TexelGeometry;
+    use bevy::math::{Affine3A, Vec2, Vec3};
+    use std::sync::Arc;
 
     fn stamp(kind: MatterKind, volume_nl: u32) -> Deposit {
         Deposit { center: [8 * 256; 2], radius: [3 * 256, 2 * 256], kind, volume_nl }
@@ -194,5 +206,45 @@ mod tests {
         let stock = ground.matter.stock();
         let units = |nl: u64| ground.water.units.from_nl(nl);
         assert_eq!((stock.snow, stock.dust, stock.mud), (units(50_000_000), units(2000), 0));
+    }
+
+    #[test]
+    fn matter_of_one_island_does_not_come_to_what_lies_beside_it_in_the_image_alone() {
+        // Two floors, two columns apart on the map and 10 m in space.
+        let mut place = Place::flat(64, 0.01);
+        let mut triangles = MeshTriangles::default();
+        for (from, away) in [(0.0, 0.0), (33.0, 10.0)] {
+            for corners in [[Vec2::ZERO, Vec2::ONE, Vec2::X], [Vec2::ZERO, Vec2::Y, Vec2::ONE]] {
+                let in_space = |at: Vec2| Vec3::new(away + at.x * 0.31, 0.0, at.y * 0.64);
+                triangles.source.push(triangles.source.len() as u32);
+                triangles.positions.push(corners.map(in_space));
+                let on_map = |at: Vec2| Vec2::new((from + at.x * 31.0) / 64.0, at.y);
+                triangles.uvs.push(corners.map(on_map));
+            }
+        }
+        place.geometry =
+            Arc::new(TexelGeometry::new(&triangles, &Affine3A::IDENTITY, Vec3::Y, 64, [Wrap::Clamp; 2]));
+        let on_right = |texel: u32| place.geometry.owner(texel).is_some_and(|owner| owner >= 2);
+        for kind in [MatterKind::Dust, MatterKind::Mud, MatterKind::Snow] {
+            for (column, is_right) in [(30, false), (33, true)] {
+                for radius in [1, 3, 10, 25] {
+                    let freezing = place.clone().with(|weather| weather.temperature_c = -4.0);
+                    let mut ground = Ground::dry(&freezing);
+                    let center = [column * 256 + 130, 20 * 256];
+                    ground.put(
+                        &freezing,
+                        1,
+                        Deposit { center, radius: [radius * 256; 2], kind, volume_nl: 10_007 },
+                    );
+                    let lies = |texel: &TexelMatter| texel.soil() + u64::from(texel.snow);
+                    let texels = (0u32..).zip(&ground.matter.texels);
+                    let here: u64 = texels
+                        .filter(|&(texel, _)| on_right(texel) == is_right)
+                        .map(|(_, matter)| lies(matter))
+                        .sum();
+                    assert_eq!(here, ground.water.units.from_nl(10_007), "{kind:?} {column} {radius}");
+                }
+            }
+        }
     }
 }

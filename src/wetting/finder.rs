@@ -32,6 +32,9 @@ const NEIGHBOUR_REACHES: f64 = 1.2;
 /// The same for a place and a texel that is sought around it.
 const SEARCH_REACHES: f64 = 3.0;
 
+/// The same for the middles of texels side by side, if the parts of the mesh that they lie on are to count as one.
+const SIDE_BY_SIDE_REACHES: f64 = 0.75;
+
 /// Finds texels along ways over the surface.
 pub(super) struct Finder<'a> {
     pub(super) grid: Grid,
@@ -105,6 +108,30 @@ impl<'a> Finder<'a> {
             End::Texel(other) | End::Elsewhere(Some(other)) => other,
             End::Itself | End::MeshEnds | End::Elsewhere(None) => texel,
         }
+    }
+
+    /// The same from the border of an island to a texel that is not the island's: that one itself if no way leads there, and it
+    /// lies in space where the way would have ended. Planks beside each other are one wall to what falls on them.
+    pub(super) fn stray(&self, from: u32, offset: [i32; 2], there: u32) -> u32 {
+        match self.stand_in(from, offset) {
+            other if other == from && self.lies_ahead(from, offset, there) => there,
+            other => other,
+        }
+    }
+
+    /// Whether a texel lies straight ahead of another in space, by as much as in the image.
+    fn lies_ahead(&self, from: u32, [columns, rows]: [i32; 2], there: u32) -> bool {
+        let (Some(start), Some(place)) = (self.place(from), self.place(there)) else { return false };
+        let step = DVec2::new(f64::from(columns), f64::from(rows));
+        let Some(step) = self.surface.step_in_space(start.triangle, step) else { return false };
+        let reach = self.reach[start.triangle as usize].max(self.reach[place.triangle as usize]);
+        let ahead = self.surface.in_space(&start) + step;
+        ahead.distance(self.surface.in_space(&place)) <= reach * SAME_TEXEL_REACHES
+    }
+
+    /// Whether two texels that lie side by side in the image do so in space.
+    pub(super) fn lie_side_by_side(&self, texel: u32, other: u32) -> bool {
+        self.place(texel).is_some_and(|place| self.is_near(&place, other, SIDE_BY_SIDE_REACHES))
     }
 
     /// Follows a way from a texel. None if its triangle has no directions on the map.

@@ -8,6 +8,7 @@ use super::Units;
 use super::finder::Finder;
 use super::grid::Grid;
 use super::gutters::Gutters;
+use super::islands::Islands;
 use super::links::Links;
 use super::ownership::{NOBODY, Ownership};
 use super::points::front_normals;
@@ -19,7 +20,7 @@ use crate::overlay::{TexelAreas, Wrap};
 pub use super::grid::Side;
 pub use super::links::Link;
 
-/// Marks a texel among triangles. There are fewer triangles than this.
+/// Marks a number among triangles. There are fewer triangles than this.
 const STAND_IN: u32 = 1 << 31;
 
 /// Where the texels of a map lie in the world, and who lies beside whom on the mesh.
@@ -27,8 +28,8 @@ const STAND_IN: u32 = 1 << 31;
 /// Texels are numbered row by row from v = 0. One that lies on a triangle is *owned* by it: by the first that
 /// covers its middle or, if none does, by a triangle too small to cover any middle.
 ///
-/// The mesh is that of one moment: move, turn or scale it, and this must be made anew (which takes about a
-/// second for the largest map); [`Self::posed`] takes it to another pose of the same triangles for less. It does
+/// The mesh is that of one moment: move, turn or scale it, and this must be made anew (which takes a second or
+/// two for the largest map); [`Self::posed`] takes it to another pose of the same triangles for less. It does
 /// not know of gaps too narrow for a texel, nor of edges that touch without sharing their corners: the mesh ends
 /// there.
 ///
@@ -43,8 +44,11 @@ pub(crate) struct TexelLayout {
     size: u32,
     area_mm2: Vec<f32>,
     mean_mm2: f32,
-    /// By texel: its triangle, or [`STAND_IN`] and the texel that stands in for it, or [`NOBODY`].
+    /// By texel: its triangle, or [`STAND_IN`] and where in `stand_ins` to look, or [`NOBODY`].
     owner: Vec<u32>,
+    /// The texel that stands in for one that nobody owns, and the island next to which that lies.
+    stand_ins: Vec<[u32; 2]>,
+    islands: Islands,
     links: Links,
     gutters: Gutters,
     /// A tile, and another with texels that show what the first one holds; ascending.
@@ -70,6 +74,8 @@ impl TexelGeometry {
         let owners = Ownership::new(triangles, grid);
         let finder = Finder::new(grid, &surface, &owners);
         let (links, mut gutters) = (Links::new(&finder), Gutters::new(&finder));
+        let stand_ins = gutters.take_stand_ins();
+        let islands = Islands::new(&finder, &stand_ins);
         let above_origin =
             |texel: u32| finder.place(texel).map(|place| surface.in_space(&place).dot(up.as_dvec3()) as f32);
         let heights = (0..grid.texels() as u32).map(above_origin);
@@ -84,7 +90,13 @@ impl TexelGeometry {
         let facing = normals.iter().map(|normal| normal.dot(up));
         let slopes = Slopes::new(heights, &owners.triangle, facing, lengths.collect());
         let mut owner = owners.triangle;
-        gutters.take_stand_ins().for_each(|(texel, other)| owner[texel as usize] = STAND_IN | other);
+        for (number, stand_in) in (0u32..).zip(&stand_ins) {
+            owner[stand_in.texel as usize] = STAND_IN | number;
+        }
+        let stand_ins = stand_ins
+            .iter()
+            .map(|stand_in| [stand_in.other, islands.of(owner[stand_in.from as usize])])
+            .collect();
         let layout = TexelLayout {
             size,
             area_mm2: areas.mm2,
@@ -94,6 +106,8 @@ impl TexelGeometry {
             gutters,
             mean_length,
             owner,
+            stand_ins,
+            islands,
         };
         Self { layout: Arc::new(layout), slopes }
     }
@@ -191,9 +205,44 @@ impl TexelGeometry {
     pub fn stand_in(&self, texel: u32) -> Option<u32> {
         match self.layout.owner[texel as usize] {
             NOBODY => None,
-            other if other >= STAND_IN => Some(other - STAND_IN),
+            number if number >= STAND_IN => Some(self.layout.stand_ins[(number - STAND_IN) as usize][0]),
             _ => Some(texel),
         }
+    }
+
+    /// The island of the map that a stamp must be kept to whose middle lies over a texel: None if all of these columns and
+    /// rows, from first to last, lie on that island, or if it is not known.
+    pub(crate) fn island_to_keep_to(&self, texel: u32, columns: (i32, i32), rows: (i32, i32)) -> Option<u32> {
+        let layout = &self.layout;
+        if layout.islands.is_one(columns, rows) {
+            return None;
+        }
+        match layout.owner[texel as usize] {
+            NOBODY => None,
+            number if number >= STAND_IN => Some(layout.stand_ins[(number - STAND_IN) as usize][1]),
+            triangle => Some(layout.islands.of(triangle)),
+        }
+    }
+
+    /// Who gets what falls over a texel from a stamp that is kept to an island: the texel itself if it is of that island. Else
+    /// the one to which a way leads straight over the island's border and on over the mesh; where the mesh ends, that of the
+    /// border. Far out it is the island's nearest in the row or the column, towards `home`, or `home` if there is none.
+    pub(crate) fn on_island(&self, island: u32, texel: u32, home: u32) -> u32 {
+        let layout = &self.layout;
+        let islands = &layout.islands;
+        match layout.owner[texel as usize] {
+            NOBODY => {}
+            number if number >= STAND_IN => {
+                let [other, next_to] = layout.stand_ins[(number - STAND_IN) as usize];
+                if next_to == island {
+                    return other;
+                }
+            }
+            triangle if islands.of(triangle) == island => return texel,
+            _ => {}
+        }
+        let is_of_island = |other: u32| self.owner(other).is_some_and(|owner| islands.of(owner) == island);
+        islands.stray(island, texel).or_else(|| islands.towards(home, texel, is_of_island)).unwrap_or(home)
     }
 
     /// For a texel that nobody owns but that lies within 2 columns and 2 rows of one that somebody does: the
@@ -268,6 +317,8 @@ impl TexelGeometry {
         let layout = &self.layout;
         layout.area_mm2.capacity() * size_of::<f32>()
             + layout.owner.capacity() * size_of::<u32>()
+            + layout.stand_ins.capacity() * size_of::<[u32; 2]>()
+            + layout.islands.bytes()
             + layout.links.bytes()
             + layout.gutters.bytes()
             + self.slopes.bytes()

@@ -1,7 +1,7 @@
 //! Texels between the islands of a map: no triangle lies on them, but stamps do, and the filter of a sampler.
 
 use super::finder::Finder;
-use super::grid::Side;
+use super::grid::{Grid, Side};
 use crate::overlay::TILE_SIZE;
 
 /// Rings of texels around the islands that have a stand-in.
@@ -12,19 +12,38 @@ const SOURCE_TEXELS: i32 = 2;
 
 /// Who takes the place of texels that no triangle owns.
 pub(super) struct Gutters {
-    /// A texel, and the owned one that continues the surface there; ascending.
-    stand_ins: Vec<(u32, u32)>,
+    /// Ascending by texel.
+    stand_ins: Vec<StandIn>,
     /// A texel, and the owned one nearest to it in the image; ascending.
     sources: Vec<(u32, u32)>,
 }
 
+/// Who stands for the surface at a texel that no triangle owns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct StandIn {
+    pub(super) texel: u32,
+    /// The owned texel that continues the surface there.
+    pub(super) other: u32,
+    /// The owned texel of the nearest island, from which the way led there.
+    pub(super) from: u32,
+}
+
 /// A texel of a ring.
-struct Reached {
-    texel: u32,
+pub(super) struct Reached {
+    pub(super) texel: u32,
     /// The owned texel from which it was reached.
-    from: u32,
+    pub(super) from: u32,
     /// The way from there, in columns and rows.
-    offset: [i32; 2],
+    pub(super) offset: [i32; 2],
+}
+
+impl Reached {
+    /// The texel on a side of this one in the image, reached over it.
+    pub(super) fn onward(&self, grid: Grid, side: Side) -> Option<Self> {
+        let [columns, rows] = side.offset();
+        let texel = grid.beside(self.texel, [columns, rows])?;
+        Some(Self { texel, from: self.from, offset: [self.offset[0] + columns, self.offset[1] + rows] })
+    }
 }
 
 impl Gutters {
@@ -61,18 +80,16 @@ impl Gutters {
         for number in 1..=STAND_IN_RINGS {
             let mut next = Vec::new();
             for reached in &ring {
-                for side in Side::ALL {
-                    let [columns, rows] = side.offset();
-                    let Some(texel) = grid.beside(reached.texel, [columns, rows]) else { continue };
-                    if !std::mem::replace(&mut seen[texel as usize], true) {
-                        let offset = [reached.offset[0] + columns, reached.offset[1] + rows];
-                        next.push(Reached { texel, from: reached.from, offset });
+                for onward in Side::ALL.into_iter().filter_map(|side| reached.onward(grid, side)) {
+                    if !std::mem::replace(&mut seen[onward.texel as usize], true) {
+                        next.push(onward);
                     }
                 }
             }
             next.sort_unstable_by_key(|reached| reached.texel);
             for reached in &next {
-                gutters.stand_ins.push((reached.texel, finder.stand_in(reached.from, reached.offset)));
+                let &Reached { texel, from, offset } = reached;
+                gutters.stand_ins.push(StandIn { texel, other: finder.stand_in(from, offset), from });
                 // No ring beyond that of the corners has a part in the square.
                 if number <= 2 * SOURCE_TEXELS
                     && let Some(source) = nearest_in_image(finder, reached.texel)
@@ -82,16 +99,15 @@ impl Gutters {
             }
             ring = next;
         }
-        for list in [&mut gutters.stand_ins, &mut gutters.sources] {
-            list.sort_unstable();
-            list.shrink_to_fit();
-        }
+        gutters.stand_ins.sort_unstable();
+        gutters.sources.sort_unstable();
+        gutters.sources.shrink_to_fit();
         gutters
     }
 
-    /// Unowned texels, and the owned ones that continue the surface there; afterwards there are none.
-    pub(super) fn take_stand_ins(&mut self) -> impl Iterator<Item = (u32, u32)> + use<> {
-        std::mem::take(&mut self.stand_ins).into_iter()
+    /// Who stands for unowned texels, ascending; afterwards nobody does.
+    pub(super) fn take_stand_ins(&mut self) -> Vec<StandIn> {
+        std::mem::take(&mut self.stand_ins)
     }
 
     /// The owned texel nearest to an unowned one.
@@ -101,7 +117,7 @@ impl Gutters {
 
     /// Memory held, bytes.
     pub(super) fn bytes(&self) -> usize {
-        (self.stand_ins.capacity() + self.sources.capacity()) * size_of::<(u32, u32)>()
+        self.stand_ins.capacity() * size_of::<StandIn>() + self.sources.capacity() * size_of::<(u32, u32)>()
     }
 }
 

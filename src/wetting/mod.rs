@@ -32,6 +32,7 @@ mod geometry;
 pub mod gpu;
 mod grid;
 mod gutters;
+mod islands;
 mod links;
 pub mod look;
 mod marks;
@@ -83,9 +84,9 @@ pub use timing::MeasureTiming;
 pub(crate) use geometry::TexelLayout;
 #[cfg(test)]
 pub(crate) use run_off::{RunScratch, run_off};
-pub(crate) use soak::note_arrival;
 #[cfg(test)]
 pub(crate) use soak::{SoakScratch, soak};
+pub(crate) use soak::{note_arrival, texel_under};
 pub(crate) use surface::{Now, Tiles, jitter, texel_in};
 
 /// Drips of this tick, of one surface.

@@ -2,6 +2,10 @@
 //!
 //! All drops of a tick are gathered first ([`Arrivals`]), and each texel then gets what came to it at once, with the speed of
 //! the fastest drop. So a texel under a hundred stamps is visited once.
+//!
+//! A stamp is columns and rows of the image. Where these leave its island, the water does not: it goes over the mesh, and not to
+//! what happens to lie beside ([`TexelGeometry::on_island`](super::TexelGeometry)). Few stamps reach so far; they are gathered
+//! island by island.
 
 use super::arrivals::{Arrivals, Parcel};
 use super::flow::LEAST_RETAINED;
@@ -34,14 +38,16 @@ pub struct Drop {
 pub(crate) struct SoakScratch {
     columns: Vec<(u32, [u32; 2])>,
     arrivals: Arrivals,
+    /// Islands, and which drops of the tick on each of them reach beyond it and wait for their turn.
+    beyond: Vec<(u32, u32)>,
     /// Where sources are kept: texels that were hit, and whose the drop was.
     hits: Vec<(u32, Source)>,
     /// The same: texels that got water, and the texel that was hit for it.
     wetted: Vec<(u32, u32)>,
 }
 
-/// Puts the drops of a tick on the surface: to each texel its share of their stamps. What would fall beside the surface's
-/// islands goes to the texel that continues it there, across the seam, or to the one that was hit.
+/// Puts the drops of a tick on the surface: to each texel its share of their stamps. What would fall beside the island that was
+/// hit goes to the texel that continues it there, across the seam, or to its border.
 pub(crate) fn soak(
     water: &mut SurfaceWater,
     now: &Now,
@@ -53,24 +59,48 @@ pub(crate) fn soak(
     if drops.is_empty() {
         return;
     }
-    let SoakScratch { columns, arrivals, hits, wetted } = scratch;
+    let SoakScratch { columns, arrivals, beyond, hits, wetted } = scratch;
     let size = water.size;
-    let to_texel = |[x, y]: [u32; 2], parcel: Parcel| {
-        let under = y * size + x;
-        match now.geometry.stand_in(under).unwrap_or(parcel.home) {
-            texel if texel == under => [x, y],
-            other => [other % size, other / size],
+    let cell_of = |[x, y]: [u32; 2], texel: u32| {
+        // Mostly it is the one that it falls over: no division.
+        if texel == y * size + x { [x, y] } else { [texel % size, texel / size] }
+    };
+    let to_texel = |cell: [u32; 2], parcel: Parcel| {
+        cell_of(cell, now.geometry.stand_in(cell[1] * size + cell[0]).unwrap_or(parcel.home))
+    };
+    let to_island = |island: u32| {
+        move |cell: [u32; 2], parcel: Parcel| {
+            cell_of(cell, now.geometry.on_island(island, cell[1] * size + cell[0], parcel.home))
         }
     };
     arrivals.begin(size);
-    for drop in drops {
-        gather(water, now, drop, columns, arrivals, to_texel);
+    for (number, drop) in (0u32..).zip(drops) {
+        let stamp = Stamp::new(drop, size);
+        let [columns_of, rows_of] = stamp.texels();
+        match now.geometry.island_to_keep_to(texel_under(drop.center, size), columns_of, rows_of) {
+            None => gather(water, now, drop, &stamp, columns, arrivals, to_texel),
+            // In texels nothing is mixed with what others bring.
+            Some(island) if stamp.level == 0 => {
+                gather(water, now, drop, &stamp, columns, arrivals, to_island(island));
+            }
+            Some(island) => beyond.push((island, number)),
+        }
         water.ledger.received += water.units.from_nl(u64::from(drop.water_nl));
         if water.origins.is_kept() {
             hits.push((hit_texel(now, drop, size), drop.source));
         }
     }
     arrivals.share_out(size, water.wrap, to_texel);
+    beyond.sort_unstable();
+    for of_island in beyond.chunk_by(|one, other| one.0 == other.0) {
+        let to_texel = to_island(of_island[0].0);
+        for &(_, number) in of_island {
+            let drop = &drops[number as usize];
+            gather(water, now, drop, &Stamp::new(drop, size), columns, arrivals, to_texel);
+        }
+        arrivals.share_out(size, water.wrap, to_texel);
+    }
+    beyond.clear();
     arrivals.drain(|[x, y], parcel| {
         let texel = y * size + x;
         if water.origins.is_kept() {
@@ -97,21 +127,46 @@ fn name_sources(water: &mut SurfaceWater, hits: &mut Vec<(u32, Source)>, wetted:
     hits.clear();
 }
 
+/// The stamp of a drop on the grid that it is gathered on.
+struct Stamp {
+    level: u32,
+    /// In cells of that grid.
+    splat: Splat,
+}
+
+impl Stamp {
+    /// On a surface with so many texels along each side.
+    fn new(drop: &Drop, size: u32) -> Self {
+        let level = Arrivals::level(drop.radius, size);
+        let splat = Splat {
+            center: drop.center.map(|middle| middle >> level),
+            radius: drop.radius.map(|radius| Arrivals::gathered_radius(radius, level)),
+            ..bytemuck::Zeroable::zeroed()
+        };
+        Self { level, splat }
+    }
+
+    /// First and last column and row of texels that may get something of it.
+    fn texels(&self) -> [(i32, i32); 2] {
+        [0, 1].map(|axis| match (self.level, self.splat.span(axis)) {
+            (0, span) => span,
+            // In the end a cell reaches over those beside it.
+            (level, (first, last)) => ((first - 1) << level, ((last + 2) << level) - 1),
+        })
+    }
+}
+
 /// Adds a drop to what has come in this tick.
 fn gather(
     water: &SurfaceWater,
     now: &Now,
     drop: &Drop,
+    stamp: &Stamp,
     columns: &mut Vec<(u32, [u32; 2])>,
     arrivals: &mut Arrivals,
     to_texel: impl Fn([u32; 2], Parcel) -> [u32; 2],
 ) {
-    let level = Arrivals::level(drop.radius, water.size);
-    let stamp = Splat {
-        center: drop.center.map(|middle| middle >> level),
-        radius: drop.radius.map(|radius| Arrivals::gathered_radius(radius, level)),
-        ..bytemuck::Zeroable::zeroed()
-    };
+    let (level, stamp) = (stamp.level, &stamp.splat);
     let (size, wrap) = (water.size >> level, water.wrap);
     let axes = [stamp.axis(0, size, wrap), stamp.axis(1, size, wrap)];
     let home = hit_texel(now, drop, water.size);
@@ -146,10 +201,15 @@ fn put(
     }
 }
 
+/// The texel over which the middle of a stamp lies, whoever owns it. In 1/256 texel.
+pub(crate) fn texel_under(center: [i32; 2], size: u32) -> u32 {
+    let [x, y] = center.map(|middle| (middle >> 8).clamp(0, size as i32 - 1) as u32);
+    y * size + x
+}
+
 /// The texel that was hit or, if the middle of the stamp is not on the surface, the one beside it that is.
 fn hit_texel(now: &Now, drop: &Drop, size: u32) -> u32 {
-    let [x, y] = drop.center.map(|middle| (middle >> 8).clamp(0, size as i32 - 1) as u32);
-    let under = y * size + x;
+    let under = texel_under(drop.center, size);
     now.geometry.stand_in(under).unwrap_or(under)
 }
 
@@ -164,5 +224,123 @@ pub(crate) fn note_arrival(water: &mut SurfaceWater, now: &Now, texel: u32, tile
     }
     if now.matter.capacity_mm > 0.0 && !water.tiles.has(tile, Tiles::SPREADING) {
         water.tiles.spread(tile);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::TexelGeometry;
+    use super::super::points::surface_points;
+    use super::super::test_meshes::{Cube, floor, joined, sheet};
+    use super::*;
+    use crate::collision::MeshTriangles;
+    use crate::material::PorousMaterial;
+    use crate::overlay::Wrap;
+    use crate::weather::DryingClock;
+    use bevy::math::{Affine3A, Vec2, Vec3};
+
+    const CLAMP: [Wrap; 2] = [Wrap::Clamp; 2];
+
+    fn geometry(mesh: &MeshTriangles, size: u32) -> TexelGeometry {
+        TexelGeometry::new(mesh, &Affine3A::IDENTITY, Vec3::Y, size, CLAMP)
+    }
+
+    /// Water so many texels from its middle to its rim, as a drop at a point of the map in 1/256 texel.
+    fn drop_at(center: [i32; 2], radius: i32, water_nl: u32) -> Drop {
+        Drop { center, radius: [radius * 256; 2], water_nl, speed_mm: 0, source: Source::UNKNOWN }
+    }
+
+    /// What a dry surface that takes up nothing holds after one tick.
+    fn soaked(geometry: &TexelGeometry, drops: &[Drop]) -> SurfaceWater {
+        let glazed = PorousMaterial { capacity_mm: 0.0, ..PorousMaterial::default() };
+        let drying = DryingClock::default();
+        let now = Now::new(1, 60, &drying, geometry, None, &glazed);
+        let mut water = SurfaceWater::of_size(geometry.size(), CLAMP, geometry.mean_mm2());
+        water.wake(false);
+        let mut scratch = SoakScratch::default();
+        soak(&mut water, &now, drops, &mut scratch, None, &Weather::default());
+        assert!(scratch.beyond.is_empty());
+        water
+    }
+
+    /// Nanolitres on the triangles from one to another.
+    fn held_nl(water: &SurfaceWater, geometry: &TexelGeometry, triangles: std::ops::Range<u32>) -> u64 {
+        let on_them = (0u32..)
+            .zip(water.texels())
+            .filter(|&(texel, _)| geometry.owner(texel).is_some_and(|owner| triangles.contains(&owner)));
+        water.units().whole_nl(on_them.map(|(_, texel)| texel.total()).sum())
+    }
+
+    #[test]
+    fn not_a_nanolitre_goes_to_an_island_that_is_beside_in_the_image_alone() {
+        // Two columns apart in the image, 50 m in space.
+        let part = |column: f32, away: f32| {
+            let on_map = move |point: Vec2| (Vec2::new(column, 8.0) + point * Vec2::new(55.0, 112.0)) / 128.0;
+            sheet(3, move |point| floor(point) + Vec3::X * away, on_map)
+        };
+        let geometry = geometry(&joined([part(8.0, 0.0), part(65.0, 50.0)]), 128);
+        let (left, right) = (62 * 256 + 200, 65 * 256 + 90);
+        for radius in [1, 3, 10, 20, 50] {
+            for row in [64 * 256, 9 * 256, 119 * 256 + 77] {
+                let water = soaked(&geometry, &[drop_at([left, row], radius, 1_000_003)]);
+                assert_eq!(held_nl(&water, &geometry, 18..36), 0, "{radius} {row}");
+                assert_eq!(held_nl(&water, &geometry, 0..18), 1_000_003, "{radius} {row}");
+                let water = soaked(&geometry, &[drop_at([right, row], radius, 500_009)]);
+                assert_eq!(held_nl(&water, &geometry, 0..18), 0, "{radius} {row}");
+                assert_eq!(held_nl(&water, &geometry, 18..36), 500_009, "{radius} {row}");
+            }
+        }
+        // Of one tick, and of all sizes: nothing is mixed on the way.
+        let drops: Vec<Drop> = [1, 10, 3, 20, 50, 12, 33]
+            .into_iter()
+            .flat_map(|radius| {
+                [drop_at([left, 9000], radius, 70_001), drop_at([right, 9100], radius, 30_011)]
+            })
+            .collect();
+        let water = soaked(&geometry, &drops);
+        assert_eq!(held_nl(&water, &geometry, 0..18), 7 * 70_001);
+        assert_eq!(held_nl(&water, &geometry, 18..36), 7 * 30_011);
+        assert_eq!(water.ledger().received, water.units().from_nl(7 * 100_012));
+    }
+
+    #[test]
+    fn both_sides_of_a_seam_get_the_same_however_their_islands_lie() {
+        for turned in [false, true] {
+            let cube = Cube { cells: 2, size: 128, island: 20.0, first: 10.0, pitch: 22.0, turned };
+            let mesh = cube.mesh();
+            let geometry = geometry(&mesh, cube.size);
+            let points = surface_points(&mesh, &Affine3A::IDENTITY, cube.size, CLAMP);
+            // Over the right border of the first face, at half its height.
+            let Some(beyond) = geometry.stand_in(20 * 128 + 30).and_then(|texel| geometry.owner(texel))
+            else {
+                panic!("the cube has no edge");
+            };
+            let (normal, next) = (Cube::FACES[0][0], Cube::FACES[cube.face(beyond)][0]);
+            for radius in [3, 5, 10] {
+                let water = soaked(&geometry, &[drop_at([30 * 256 - 1, 20 * 256], radius, 50_000_000)]);
+                let at = |texel: u32| water.texels()[texel as usize].total() as f64;
+                let most = (0..128 * 128).map(at).fold(0.0, f64::max);
+                let mut wet = 0;
+                for column in 22..30 {
+                    for row in 13..27 {
+                        let texel = row * 128 + column;
+                        let here = points.iter().find(|point| point.texel == texel).unwrap().position;
+                        // The same place, folded over the edge.
+                        let depth = 0.5 - here.dot(next);
+                        let over = here + (next - normal) * depth;
+                        let there = points.iter().find(|point| point.position.distance(over) < 1e-3).unwrap();
+                        let [here, there] = [texel, there.texel].map(at);
+                        assert!(
+                            (here - there).abs() < 0.02 * most,
+                            "{radius} {column} {row}: {here} {there}"
+                        );
+                        wet += u32::from(here > 0.1 * most);
+                    }
+                }
+                assert!(wet > 6, "{wet}");
+                let on_both = held_nl(&water, &geometry, 0..48);
+                assert_eq!(on_both, 50_000_000);
+            }
+        }
     }
 }

@@ -106,6 +106,23 @@ impl Surface {
         Some(Walk { surface: self, at, rates, came_over: None, left: 1.0, legs: 0, over_seam: false })
     }
 
+    /// The triangles beyond a triangle's edges, where the map goes on there as well.
+    pub(super) fn beside(&self, triangle: u32) -> impl Iterator<Item = u32> {
+        (0..3).filter_map(move |edge| {
+            let beyond = self.adjacency.beyond(triangle, edge)?;
+            let near = [edge, (edge + 1) % 3, (edge + 2) % 3];
+            (!self.is_seam(triangle, near, beyond)).then_some(beyond.triangle)
+        })
+    }
+
+    /// Whether an edge lies on the map in two places. `near` as in [`Self::turn`].
+    fn is_seam(&self, triangle: u32, near: [usize; 3], beyond: Beyond) -> bool {
+        let (map, far_map) = (&self.map[triangle as usize], &self.map[beyond.triangle as usize]);
+        let shifts = [0, 1].map(|end| (far_map[beyond.corners[end]] - map[near[end]]).as_dvec2());
+        (shifts[0] - shifts[1]).abs().max_element() > SEAM_TEXELS
+            || !self.grid.is_whole_tiles(shifts[0], SEAM_TEXELS)
+    }
+
     fn rates_in_space(&self, triangle: u32, rates: [f64; 3]) -> DVec3 {
         let corners = self.space[triangle as usize];
         // Rates have the sum 0, so any origin will do; a corner is the most exact.
@@ -123,10 +140,7 @@ impl Surface {
     ) -> Option<([f64; 3], bool)> {
         let far = beyond.corners;
         let (map, far_map) = (&self.map[triangle as usize], &self.map[beyond.triangle as usize]);
-        let shifts = [0, 1].map(|end| (far_map[far[end]] - map[near[end]]).as_dvec2());
-        let is_seam = (shifts[0] - shifts[1]).abs().max_element() > SEAM_TEXELS
-            || !self.grid.is_whole_tiles(shifts[0], SEAM_TEXELS);
-        if !is_seam {
+        if !self.is_seam(triangle, near, beyond) {
             let step = sum(rates, *map, |corner, rate| (corner - map[0]).as_dvec2() * rate);
             // Not where the map is folded back along the edge: the way would lead out again at once.
             let inside = |rates: &[f64; 3]| rates[far[2]] > 0.0;
