@@ -341,7 +341,12 @@ fn write_tiles(
 
 #[cfg(test)]
 mod tests {
+    use bevy::math::Affine3A;
+
+    use super::super::TexelGeometry;
     use super::*;
+    use crate::collision::MeshTriangles;
+    use crate::overlay::{Weatherable, Wrap};
 
     /// Tiles whose texels say which they are, and when they were packed.
     fn packed(tiles: &[u32], when: u32, has_matter: bool) -> PackedTiles {
@@ -383,16 +388,6 @@ mod tests {
         assert_eq!(waiting.tiles, [0, 1, 2, 3, 4]);
         assert_eq!((waiting.texels.len(), waiting.matter.len()), (5 * TILE_TEXELS, 5 * TILE_TEXELS));
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use bevy::math::Affine3A;
-
-    use super::super::TexelGeometry;
-    use super::*;
-    use crate::collision::MeshTriangles;
-    use crate::overlay::{Weatherable, Wrap};
 
     #[test]
     fn what_lies_beside_the_mesh_is_marked_and_holds_nothing() {
