@@ -12,6 +12,7 @@
 //! Khronos Group 2021, *glTF 2.0 specification*.
 
 mod file;
+mod layout;
 mod uri;
 
 use std::path::{Path, PathBuf};
@@ -20,6 +21,8 @@ use bevy::math::{Affine3A, Mat4};
 use bevy::mesh::Mesh;
 
 use self::file::GltfFile;
+pub(crate) use self::layout::plain_name;
+pub use self::layout::{SceneLayout, SceneNode, ScenePart, SceneSkin, read_layout, read_parts};
 pub(crate) use self::uri::{data_uri, percent_decoded, read_capped, read_uri};
 use crate::collision::MeshTriangles;
 

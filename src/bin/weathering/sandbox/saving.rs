@@ -116,11 +116,7 @@ pub fn is_busy(world: &World) -> bool {
 
 /// Why the scene cannot be saved as it is.
 fn obstacle(world: &mut World) -> Option<&'static str> {
-    let opened = world.resource::<Opened>();
-    if opened.is_model {
-        return Some("A model that was opened by itself has no scenario to be saved with.");
-    }
-    let rows = opened.effects;
+    let rows = world.resource::<Opened>().effects;
     if world.contains_resource::<Recording>() {
         return Some("End the recording first: it keeps moments of its own.");
     }
@@ -166,9 +162,7 @@ pub fn show(ui: &mut egui::Ui, world: &mut World) {
             }
         }
     }
-    let is_alone = !world.resource::<Opened>().is_model
-        && !world.contains_resource::<Split>()
-        && !world.contains_resource::<Recording>();
+    let is_alone = !world.contains_resource::<Split>() && !world.contains_resource::<Recording>();
     let is_saved = is_alone && path.join("state.ron").is_file();
     if is_saved
         && ui.button("Go on from there").on_hover_text("Of the same scenario only").clicked()
