@@ -198,7 +198,7 @@ fn broken_files_are_refused_before_anything_is_written() {
     for (was, is, named) in [
         ("\"mesh\":0", "\"mesh\":7", "`scenes[0].file`"),
         ("yard.bin", "../yard.bin", "scenes[0].file -> buffers"),
-        ("\"byteLength\":48", "\"byteLength\":4800", "`scenes[0].file`"),
+        ("\"nodes\":[0,3]", "\"nodes\":[]", "show no mesh"),
     ] {
         assert!(whole.contains(was), "{was} in {whole}");
         fs::write(&model, whole.replacen(was, is, 1)).unwrap();

@@ -94,25 +94,34 @@ pub(super) fn spawn_scenes(world: &mut World, loaded: &LoadedScenario, looks: Lo
             let name = Name::new(part.name.clone());
             let place = places[part.node].mul_transform(Transform::IDENTITY);
             let place = (Transform::IDENTITY, place, ChildOf(nodes[part.node]));
-            surfaces.push(world.spawn((SceneEntity, name, surface, place)).id());
+            // Not with its maps: whoever looks at it meanwhile sees what it is made of already.
+            let porous: PorousMaterial = spec.porous.unwrap_or_default();
+            let made_of = (porous, StandingWater::default());
+            surfaces.push(world.spawn((SceneEntity, name, surface, made_of, place)).id());
             index += 1;
         }
         world.entity_mut(root).insert(AwaitedScene { scene, gltf, path, nodes, surfaces, looks });
     }
 }
 
-/// Gives the surfaces of scenes what they show, once it is there.
+/// Gives the surfaces of scenes what they show, once it is there for all of them: which file comes first must not decide which
+/// surface does.
 pub(super) fn fill_scenes(
     mut commands: Commands,
     current: Res<CurrentScenario>,
     assets: Res<AssetServer>,
     awaited: Query<(Entity, &AwaitedScene)>,
 ) {
-    for (root, scene) in &awaited {
-        // What fails is told by whoever waits for all of it.
-        if scene.state(&current.0, &assets).is_ok_and(|is_there| is_there) {
-            commands.queue(move |world: &mut World| fill(world, root));
-        }
+    // What fails is told by whoever waits for all of it.
+    let is_there =
+        |(_, scene): (Entity, &AwaitedScene)| scene.state(&current.0, &assets).is_ok_and(|all| all);
+    if awaited.is_empty() || !awaited.iter().all(is_there) {
+        return;
+    }
+    let mut roots: Vec<_> = awaited.iter().map(|(root, scene)| (scene.scene, root)).collect();
+    roots.sort_unstable();
+    for (_, root) in roots {
+        commands.queue(move |world: &mut World| fill(world, root));
     }
 }
 
@@ -145,9 +154,8 @@ fn fill(world: &mut World, root: Entity) {
         if let Some(look) = look {
             entity.insert((MeshMaterial3d(look.clone()), FileLook(look)));
         }
-        let porous: PorousMaterial = spec.porous.unwrap_or_default();
         let maps: Weatherable = maps;
-        entity.insert((Mesh3d(mesh), maps, porous, StandingWater::default()));
+        entity.insert((Mesh3d(mesh), maps));
     }
 }
 

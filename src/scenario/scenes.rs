@@ -335,6 +335,19 @@ mod tests {
     }
 
     #[test]
+    fn the_schema_has_what_files_may_say_of_scenes() {
+        let schema = crate::scenario::schema_json();
+        assert_eq!(schema["properties"]["scenes"]["items"]["$ref"], "#/$defs/SceneSpec", "{schema}");
+        let fields: Vec<&String> =
+            schema["$defs"]["SceneSpec"]["properties"].as_object().unwrap().keys().collect();
+        let mut expected = ["name", "file", "position", "rotation_deg", "scale", "porous", "maps"];
+        expected.sort_unstable();
+        let mut fields: Vec<&str> = fields.into_iter().map(String::as_str).collect();
+        fields.sort_unstable();
+        assert_eq!(fields, expected);
+    }
+
+    #[test]
     fn maps_are_as_large_as_the_mesh_asks_for_and_leave_room_for_others() {
         assert_eq!(
             [0.0, 0.6, 1.5, 100.0, f32::NAN, f32::NEG_INFINITY].map(texels),

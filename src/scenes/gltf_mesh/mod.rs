@@ -6,6 +6,9 @@
 //! URIs, or files beside the glTF; what lies outside its folder is not read. An accessor without a buffer view,
 //! zero but for a sparse part, is refused: a few bytes could ask for any amount of memory.
 //!
+//! [`read_meshes`] has the shapes of a scene, a mesh for each node; [`read_layout`] has its nodes and primitives without their
+//! numbers, for those who have them loaded by Bevy.
+//!
 //! What this does not do: skins and morph targets stay in their bind pose, compressed meshes are refused,
 //! materials are not looked at.
 //!
