@@ -102,6 +102,8 @@ mod replay;
 mod resets;
 /// Scenes that are saved and gone on with, and accounts of all water.
 mod save;
+/// Whole glTFs in scenarios, and models by themselves.
+mod scenes;
 /// What the parts are together: order, independence of a renderer.
 mod schedule;
 /// Marks across the borders of uv islands.

@@ -169,10 +169,11 @@ fn make_surfaces(
     events: &mut Vec<EventSpec>,
 ) {
     for (name, porous, water) in surfaces {
-        let Some(surface) = scenario.surfaces.iter().find(|surface| surface.name == name) else { continue };
-        let Some(material) = scenario.materials.get(&surface.material) else { continue };
-        let porous = (porous != material.porous).then_some(porous);
-        let water = (water != material.water).then_some(water);
+        let Some(first) = scenario.surface_number(&name).and_then(|surface| scenario.made_of(surface)) else {
+            continue;
+        };
+        let porous = (porous != first.porous).then_some(porous);
+        let water = (water != first.water).then_some(water);
         if porous.is_some() || water.is_some() {
             let change = MaterialChange { surface: name, material: None, porous, model: None, water };
             events.push(EventSpec { at: 0.0, what: Action::Material(change) });

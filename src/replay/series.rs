@@ -170,10 +170,8 @@ impl ReplayOptions {
 }
 
 fn columns(scenario: &Scenario) -> Vec<String> {
-    let of_surfaces = scenario
-        .surfaces
-        .iter()
-        .flat_map(|surface| OF_SURFACE.map(|column| format!("{}.{column}", surface.name)));
+    let of_surfaces =
+        scenario.surface_names().flat_map(|name| OF_SURFACE.map(|column| format!("{name}.{column}")));
     TOTALS.into_iter().map(String::from).chain(of_surfaces).collect()
 }
 

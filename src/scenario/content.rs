@@ -216,7 +216,10 @@ impl LoadedScenario {
             })?;
             Ok((surface.name.clone(), triangles, surface.transform().compute_affine(), surface.maps))
         };
-        self.scenario.surfaces.iter().enumerate().map(one).collect()
+        let own = self.scenario.surfaces.iter().enumerate().map(one);
+        let mut meshes = own.collect::<Result<Vec<_>, ScenarioError>>()?;
+        meshes.extend(self.scene_meshes()?);
+        Ok(meshes)
     }
 
     fn material_maps(&self, field: &str, material: &MaterialSpec) -> Result<MaterialMaps, ScenarioError> {

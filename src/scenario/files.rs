@@ -35,6 +35,9 @@ impl LoadedScenario {
                 files.insert(self.resolve(&format!("{field}.wet_map.map"), &map.map)?);
             }
         }
+        for (index, scene) in scenario.scenes.iter().enumerate() {
+            files.extend(self.gltf_files(&format!("scenes[{index}].file"), &scene.file)?);
+        }
         for (name, material) in &scenario.materials {
             let field = format!("materials.{name}");
             if let TextureSpec::Photo(photo) = &material.texture {

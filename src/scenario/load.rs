@@ -85,7 +85,7 @@ impl Scenario {
             .part
             .complete()
             .map_err(|field| value(file, field, "missing", "given, here or included"))?;
-        let loaded = LoadedScenario {
+        let mut loaded = LoadedScenario {
             scenario,
             file: file.into(),
             tree: tree.into(),
@@ -95,6 +95,7 @@ impl Scenario {
             included,
             origins: merged.origins,
         };
+        loaded.read_scenes()?;
         loaded.validate()?;
         Ok(loaded)
     }
@@ -222,7 +223,8 @@ fn resolve(tree: &Path, file: &Path, field: &str, value: &str) -> Result<PathBuf
 }
 
 impl LoadedScenario {
-    /// A scenario that was made in code, by the name of a file in its tree. It is taken as it is: nothing is checked.
+    /// A scenario that was made in code, by the name of a file in its tree. It is taken as it is: nothing is checked, and
+    /// its `scenes` are empty.
     pub fn made(scenario: Scenario, file: PathBuf, tree: PathBuf) -> Self {
         Self {
             scenario,

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::schema::replace;
-use super::{EmitterSpec, ScenarioPart, SurfaceSpec};
+use super::{EmitterSpec, ScenarioPart, SceneSpec, SurfaceSpec};
 
 /// Where a value was written: the file, and its field there.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,6 +18,7 @@ struct Origin {
 pub(super) struct Origins {
     materials: BTreeMap<String, Origin>,
     surfaces: Vec<Origin>,
+    scenes: Vec<Origin>,
     emitters: Vec<Origin>,
     events: Vec<Origin>,
 }
@@ -36,6 +37,7 @@ impl Origins {
             let (index, rest) = rest.split_once(']')?;
             let list = match list {
                 "surfaces" => &self.surfaces,
+                "scenes" => &self.scenes,
                 "emitters" => &self.emitters,
                 "events" => &self.events,
                 _ => return None,
@@ -101,6 +103,12 @@ impl Merged {
             over.surfaces,
             |surface: &SurfaceSpec| surface.name.as_str(),
             |index| origin(format!("surfaces[{index}]")),
+        );
+        lay_list(
+            (&mut part.scenes, &mut origins.scenes),
+            over.scenes,
+            |scene: &SceneSpec| scene.name.as_str(),
+            |index| origin(format!("scenes[{index}]")),
         );
         lay_list(
             (&mut part.emitters, &mut origins.emitters),

@@ -8,6 +8,9 @@
 //! which also take pictures and say what has to be true ([`Expectations`]). All fields, with units and defaults, are in
 //! `docs/scenarios.md`; [`schema_json`] is the same for programs.
 //!
+//! What can get wet are meshes with materials of the scenario's own ([`SurfaceSpec`]) and whole glTFs with theirs ([`SceneSpec`]).
+//! [`LoadedScenario::of_model`] is a scenario of nothing but one of these, which so can be all that a scenario can.
+//!
 //! Paths in the file are relative to its *tree*: the folder of the file or, where that folder is called
 //! `scenarios`, the one above, so that scenarios share `models/` and `textures/` beside them. Nothing outside the
 //! tree is ever read.
@@ -22,8 +25,11 @@ mod gltf_limits;
 mod gltf_uris;
 mod load;
 mod merge;
+mod model;
 mod motion;
 mod reset;
+mod scene_spawn;
+mod scenes;
 mod schema;
 mod spawn;
 mod switch;
@@ -39,11 +45,12 @@ pub use load::LoadedScenario;
 pub(crate) use load::ron_options;
 pub use motion::{ByHand, ScenarioCamera};
 pub use reset::reset_scenario;
+pub(crate) use scenes::MadeOf;
 pub use schema::schema_json;
 pub use schema::{
     CameraKey, CameraSpec, EmitterChange, EmitterKey, EmitterSpec, EnvironmentSpec, MapBudgetSpec,
-    MaterialSpec, MeshSpec, Scenario, ScenarioPart, SunSpec, SurfaceSpec, SurfaceTextureSpec, TextureSpec,
-    WeatherPart, WeatherSpec, WetMapSpec,
+    MaterialSpec, MeshSpec, Scenario, ScenarioPart, SceneSpec, SunSpec, SurfaceSpec, SurfaceTextureSpec,
+    TextureSpec, WeatherPart, WeatherSpec, WetMapSpec,
 };
 pub(crate) use spawn::spawn_emitter;
 pub use spawn::{AssetTree, ScenarioPlugin, ScenarioStatus, ScenarioSurface, SceneEntity};

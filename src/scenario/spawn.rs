@@ -13,6 +13,7 @@ use bevy::render::RenderApp;
 use super::content::{Content, Looks};
 use super::follow::{follow_effect, follow_effect_files};
 use super::motion::{ScenarioCamera, move_camera};
+use super::scene_spawn::{AwaitedScene, fill_scenes, spawn_scenes};
 use super::timeline::{MaterialHandles, apply_events_plugin, camera_keys, emitter_motion, insert_events};
 use super::{Digest, LoadedScenario, MeshSpec, Scenario, ScenarioError};
 use crate::clock::ClockPlugin;
@@ -62,7 +63,7 @@ impl ScenarioPlugin {
 
 /// The running scenario.
 #[derive(Resource, Debug, Clone)]
-struct CurrentScenario(LoadedScenario);
+pub(super) struct CurrentScenario(pub(super) LoadedScenario);
 
 /// What a scenario has spawned: it goes when another takes its place.
 #[derive(Component, Debug, Default, Clone, Copy)]
@@ -108,6 +109,8 @@ impl Plugin for ScenarioPlugin {
                     .after(PrepareStamps),
             )
             .add_systems(PreUpdate, follow_effect_files.before(RefreshEffects))
+            // What they show is built in the same frame.
+            .add_systems(PreUpdate, fill_scenes.run_if(is_loading).before(BuildColliders))
             .add_systems(Update, move_camera);
         apply_events_plugin(app);
 
@@ -141,7 +144,7 @@ pub(super) fn set_up(world: &mut World, loaded: &LoadedScenario, seed: Option<u6
 }
 
 /// What the asset server calls a file of the scenario.
-fn asset_path(world: &World, loaded: &LoadedScenario, path: &str) -> String {
+pub(super) fn asset_path(world: &World, loaded: &LoadedScenario, path: &str) -> String {
     match world.get_resource::<AssetTree>() {
         Some(AssetTree(tree)) if *tree != loaded.tree => {
             loaded.tree.join(path).to_string_lossy().into_owned()
@@ -204,6 +207,7 @@ pub(super) fn spawn_scene(world: &mut World, loaded: &LoadedScenario, content: C
             entity.insert((MeshMaterial3d(material.clone()), textures.clone()));
         }
     }
+    spawn_scenes(world, loaded, looks);
     let handles = materials.into_iter().map(|(_, material, textures)| (material, textures));
     world.insert_resource(MaterialHandles(handles.collect()));
     if looks == Looks::All {
@@ -312,13 +316,20 @@ fn watch_loading(
             Or<(Without<SurfaceCollider>, Without<TexelArea>, Without<wetting::Exposure>)>,
         ),
     >,
+    awaited: Query<&AwaitedScene>,
     (exposure, measuring, frames): (Res<ExposureProgress>, Res<MeasureProgress>, Res<FramesWork>),
     mut status: ResMut<ScenarioStatus>,
     mut time: ResMut<Time<Virtual>>,
 ) {
+    let scenario = &current.0.scenario;
+    if let Some(error) = awaited.iter().find_map(|scene| scene.state(&current.0, &assets).err()) {
+        *status = ScenarioStatus::Failed(error);
+        return;
+    }
     for (surface, maps, mesh, refused, not_unwrapped) in &surfaces {
-        let shape = match &current.0.scenario.surfaces[surface.index as usize].mesh {
-            MeshSpec::File(path) => path.as_str(),
+        let scene = scenario.scene_of(surface.index);
+        let shape = match scenario.surfaces.get(surface.index as usize).map(|spec| &spec.mesh) {
+            Some(MeshSpec::File(path)) => path.as_str(),
             _ => surface.name.as_str(),
         };
         let (field, value, reason) = match (refused, assets.get_load_state(&mesh.0), not_unwrapped) {
@@ -329,7 +340,11 @@ fn watch_loading(
             }
             _ => continue,
         };
-        let field = format!("surfaces[{}].{field}", surface.index);
+        let field = match (scene, field) {
+            (Some(scene), "mesh") => format!("scenes[{scene}].file"),
+            (Some(scene), field) => format!("scenes[{scene}].{field}"),
+            (None, field) => format!("surfaces[{}].{field}", surface.index),
+        };
         *status = ScenarioStatus::Failed(current.0.content_error(&field, value, reason));
         return;
     }

@@ -6,8 +6,8 @@ use std::fmt::Display;
 use bevy::math::{Vec2, Vec3};
 
 use super::{
-    EmitterSpec, LoadedScenario, MapBudgetSpec, MaterialSpec, MeshSpec, Scenario, ScenarioError, SurfaceSpec,
-    SurfaceTextureSpec, TextureSpec,
+    EmitterSpec, LoadedScenario, MapBudgetSpec, MaterialSpec, MeshSpec, Scenario, ScenarioError, SceneSpec,
+    SurfaceSpec, SurfaceTextureSpec, TextureSpec,
 };
 use crate::clock::WeatheringClock;
 use crate::emitter::{EmitterShape, Flow};
@@ -98,6 +98,11 @@ impl LoadedScenario {
             if !names.insert(&surface.name) {
                 return Err(self.value(format!("{field}.name"), &surface.name, "unique"));
             }
+        }
+        // Names of scenes, which end where a dot is, and so those of their surfaces, are unique.
+        for (index, scene) in scenario.scenes.iter().enumerate() {
+            self.validate_scene(&format!("scenes[{index}]"), scene)?;
+            texels += scene.parts().map(|(_, maps)| u64::from(maps.texels()).pow(2)).sum::<u64>();
         }
         if triangles > Scenario::MAX_ALL_TRIANGLES {
             let expected = format!("at most {} (MAX_ALL_TRIANGLES)", Scenario::MAX_ALL_TRIANGLES);
@@ -196,12 +201,7 @@ impl LoadedScenario {
         if surface.scale.abs().min_element() < 1.0e-6 {
             return Err(self.value(format!("{field}.scale"), surface.scale, "at least 0.000001 per axis"));
         }
-        let size = surface.maps.map_size;
-        if size != surface.maps.texels() {
-            let expected =
-                format!("a multiple of {TILE_SIZE} up to {} (MAX_MAP_SIZE)", Weatherable::MAX_MAP_SIZE);
-            return Err(self.value(format!("{field}.maps.map_size"), size, expected));
-        }
+        self.validate_maps(field, &surface.maps)?;
         let triangles = match &surface.mesh {
             MeshSpec::Ground { size, cells }
             | MeshSpec::Road { size, cells, .. }
@@ -253,6 +253,29 @@ impl LoadedScenario {
             return Err(self.value(format!("{field}.mesh"), format!("{triangles} triangles"), expected));
         }
         Ok(triangles)
+    }
+
+    fn validate_maps(&self, field: &str, maps: &Weatherable) -> Result<(), ScenarioError> {
+        let size = maps.map_size;
+        if size == maps.texels() {
+            return Ok(());
+        }
+        let expected =
+            format!("a multiple of {TILE_SIZE} up to {} (MAX_MAP_SIZE)", Weatherable::MAX_MAP_SIZE);
+        Err(self.value(format!("{field}.maps.map_size"), size, expected))
+    }
+
+    /// But for its name and its file, which have been read.
+    fn validate_scene(&self, field: &str, scene: &SceneSpec) -> Result<(), ScenarioError> {
+        self.vector(&format!("{field}.position"), scene.position, FAR)?;
+        self.vector(&format!("{field}.rotation_deg"), scene.rotation_deg, 3600.0)?;
+        for (axis, scale) in ["x", "y", "z"].into_iter().zip(scene.scale.to_array()) {
+            self.range(&format!("{field}.scale.{axis}"), f64::from(scale), 1.0e-6, f64::from(FAR))?;
+        }
+        if let Some(porous) = &scene.porous {
+            porous.validate().map_err(|wrong| self.out_of_range(&format!("{field}.porous"), wrong))?;
+        }
+        scene.maps.as_ref().map_or(Ok(()), |maps| self.validate_maps(field, maps))
     }
 
     /// Checks an emitter by itself.

@@ -110,6 +110,16 @@ const SCENE: &str = r#"(
                 keys: [(position: (0.5, 2.0, 0.5), target: (0.5, 0.0, 0.5))])],
 )"#;
 
+/// All of the model, as a scene.
+const WHOLE: &str = r#"(
+    seconds: 1.0,
+    tick_hz: 20,
+    camera: (keys: [(eye: (0.0, 1.0, 2.0), target: (0.0, 0.0, 0.0))]),
+    scenes: [(name: "whole", file: "models/spoilt.glb", maps: (map_size: 32))],
+    emitters: [(name: "rain", effect: "rain.effect.ron", rate: 60.0, shape: Sky(half_size: (1.0, 1.0)), lifetime: 2.0,
+                keys: [(position: (0.5, 4.0, 0.5), target: (0.5, 0.0, 0.5))])],
+)"#;
+
 /// All that is read of a model without an app. A refusal names its file.
 fn read(file: &Path) -> Result<(), String> {
     let named = |error: &dyn std::error::Error| {
@@ -135,14 +145,22 @@ fn spoilt_models_are_read_or_refused() {
     let scene = folder.path().join("scene.ron");
     write(&scene, SCENE);
     write(&folder.path().join("rain.effect.ron"), "(volume_mm3: 20.0)");
+    let whole = folder.path().join("whole.ron");
+    write(&whole, WHOLE);
     let file = folder.path().join("models/spoilt.glb");
     write(&file, glb(JSON.as_bytes(), &numbers()));
     read(&file).expect("it is whole");
     run(Scenario::load(&scene).expect("it is whole"), 0.25, None).expect("it runs");
+    run(Scenario::load(&whole).expect("it is whole"), 0.25, None).expect("it runs");
     let bunny = std::fs::read(assets().join("models/bunny_1000.glb")).expect("it is in the repository");
     let tally = fuzz("models", 1000, move |_, random| {
         write(&file, spoilt(random, &bunny));
         let meshes = read(&file);
+        match Scenario::load(&whole) {
+            Ok(loaded) if random.below(5) == 0 => drop(loaded.check_content()),
+            Ok(loaded) => assert!(loaded.scenario.surface_count() > 0),
+            Err(error) => assert!(error.to_string().contains("spoilt.glb"), "no file is named: {error}"),
+        }
         let loaded = Scenario::load(&scene).map_err(|error| error.to_string())?;
         if random.below(5) == 0 {
             loaded.check_content().map_err(|error| error.to_string())?;

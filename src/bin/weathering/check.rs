@@ -54,7 +54,7 @@ fn summary(loaded: &LoadedScenario) -> Result<String, ScenarioError> {
     let variant = loaded.variant.as_ref().map(|name| format!(" [{name}]")).unwrap_or_default();
     let mut parts = vec![
         format!("{} s at {} ticks/s", scenario.seconds, scenario.tick_hz),
-        format!("{} of {triangles} triangles", counted(scenario.surfaces.len(), "surface", "surfaces")),
+        format!("{} of {triangles} triangles", counted(scenario.surface_count(), "surface", "surfaces")),
         counted(scenario.emitters.len(), "emitter", "emitters"),
     ];
     if !scenario.events.is_empty() {

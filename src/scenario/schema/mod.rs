@@ -5,6 +5,7 @@
 mod checks;
 mod emitter;
 mod part;
+mod scene;
 mod surface;
 
 use std::collections::BTreeMap;
@@ -20,6 +21,7 @@ use crate::weather::Weather;
 pub use emitter::{EmitterKey, EmitterSpec};
 pub(in crate::scenario) use part::replace;
 pub use part::{EmitterChange, ScenarioPart, WeatherPart};
+pub use scene::SceneSpec;
 pub use surface::{MaterialSpec, MeshSpec, SurfaceSpec, SurfaceTextureSpec, TextureSpec, WetMapSpec};
 
 /// A scene and what happens in it. Lengths in metres, angles in degrees, time in seconds.
@@ -59,8 +61,11 @@ pub struct Scenario {
     pub environment: Option<EnvironmentSpec>,
     /// Materials by name.
     pub materials: BTreeMap<String, MaterialSpec>,
-    /// What can get wet, at most [`Self::MAX_SURFACES`].
+    /// What can get wet, at most [`Self::MAX_SURFACES`] with those of `scenes`.
     pub surfaces: Vec<SurfaceSpec>,
+    /// Whole glTFs that can get wet, at most [`Self::MAX_SCENES`]. Their surfaces come behind the others.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub scenes: Vec<SceneSpec>,
     /// What makes it wet, at most [`Self::MAX_EMITTERS`].
     #[serde(default)]
     pub emitters: Vec<EmitterSpec>,
@@ -79,6 +84,8 @@ impl Scenario {
     pub const MAX_PARTICLES: u32 = 10_000_000;
     /// The most surfaces.
     pub const MAX_SURFACES: usize = 10_000;
+    /// The most glTF scenes.
+    pub const MAX_SCENES: usize = 256;
     /// The most emitters.
     pub const MAX_EMITTERS: usize = 4096;
     /// The most events.

@@ -7,7 +7,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    CameraSpec, EmitterSpec, EnvironmentSpec, MapBudgetSpec, MaterialSpec, Scenario, SunSpec, SurfaceSpec,
+    CameraSpec, EmitterSpec, EnvironmentSpec, MapBudgetSpec, MaterialSpec, Scenario, SceneSpec, SunSpec,
+    SurfaceSpec,
 };
 use crate::emitter::Flow;
 use crate::scenario::EventSpec;
@@ -16,7 +17,7 @@ use crate::scenario::EventSpec;
 ///
 /// Parts are laid over each other: the included files in their order, then the file itself, then one of its variants. A
 /// later `seed`, `tick_hz`, `seconds`, `gravity`, `wind`, `max_particles`, `map_budget`, `camera`, `sun` or `environment` replaces an
-/// earlier one, `weather` field by field; materials, variants, surfaces and emitters replace those of the same name and
+/// earlier one, `weather` field by field; materials, variants, surfaces, scenes and emitters replace those of the same name and
 /// else come behind the others; `emitter_changes` are made to what is there by then; events and flaws are added. Nothing can be taken
 /// away.
 #[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, PartialEq, Default)]
@@ -54,6 +55,8 @@ pub struct ScenarioPart {
     pub materials: BTreeMap<String, MaterialSpec>,
     /// What can get wet.
     pub surfaces: Vec<SurfaceSpec>,
+    /// Whole glTFs that can get wet.
+    pub scenes: Vec<SceneSpec>,
     /// What makes it wet.
     pub emitters: Vec<EmitterSpec>,
     /// Changes to emitters, by their names.
@@ -158,6 +161,7 @@ impl ScenarioPart {
             environment: self.environment,
             materials: self.materials,
             surfaces: self.surfaces,
+            scenes: self.scenes,
             emitters: self.emitters,
             events: self.events,
             flaws: self.flaws,

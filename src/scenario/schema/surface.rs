@@ -145,16 +145,18 @@ fn default_map_fill() -> f32 {
 impl SurfaceSpec {
     /// Where it stands.
     pub fn transform(&self) -> Transform {
-        let turn = self.rotation_deg.map(f32::to_radians);
-        Transform {
-            translation: self.position,
-            rotation: Quat::from_euler(EulerRot::YXZ, turn.y, turn.x, turn.z),
-            scale: self.scale,
-        }
+        placed(self.position, self.rotation_deg, self.scale)
     }
 }
 
-fn default_scale() -> Vec3 {
+/// A place as scenarios tell it.
+pub(super) fn placed(position: Vec3, rotation_deg: Vec3, scale: Vec3) -> Transform {
+    let turn = rotation_deg.map(f32::to_radians);
+    let rotation = Quat::from_euler(EulerRot::YXZ, turn.y, turn.x, turn.z);
+    Transform { translation: position, rotation, scale }
+}
+
+pub(super) fn default_scale() -> Vec3 {
     Vec3::ONE
 }
 

@@ -8,6 +8,7 @@ use crate::clock::WeatheringClock;
 use crate::emitter::Emitter;
 use crate::material::WettingTextures;
 use crate::scenario::motion::{ByHand, EmitterMotion, move_emitters};
+use crate::scenario::scene_spawn::FileLook;
 use crate::scenario::{Digest, EmitterSpec, Scenario, ScenarioSurface, digest};
 use crate::schedule::{WeatheringSystems, WeatheringTick};
 use crate::weather::Weather;
@@ -210,6 +211,9 @@ pub(crate) fn rewind(world: &mut World, tick: u32) {
         world.entity_mut(entity).insert(*water);
         let handles = world.resource::<MaterialHandles>();
         let look = past().find_map(|step| step.material).and_then(|index| handles.0.get(index)).cloned();
+        // Of a scene's surface, which began with the material of its file.
+        let own = || Some((world.get::<FileLook>(entity)?.0.clone(), WettingTextures::default()));
+        let look = look.or_else(own);
         if let Some((material, textures)) = look {
             world.entity_mut(entity).insert((MeshMaterial3d(material), textures));
         }

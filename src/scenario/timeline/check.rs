@@ -70,7 +70,7 @@ impl LoadedScenario {
     }
 
     /// It becomes part of the names of files and folders, and so leads nowhere else.
-    fn file_name(&self, field: &str, name: &str) -> Result<(), ScenarioError> {
+    pub(in crate::scenario) fn file_name(&self, field: &str, name: &str) -> Result<(), ScenarioError> {
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
         if name.is_empty() || name.len() > 64 || !name.chars().all(plain) {
             return Err(self.value(field, name, "1 to 64 letters, digits, `_` or `-`"));
@@ -89,7 +89,7 @@ impl LoadedScenario {
 
     fn one_surface(&self, field: &str, name: &str) -> Result<(), ScenarioError> {
         // That names are unique has been checked.
-        if self.scenario.surfaces.iter().any(|surface| surface.name == name) {
+        if self.scenario.surface_number(name).is_some() {
             Ok(())
         } else {
             Err(self.value(field, name, "the name of a surface"))

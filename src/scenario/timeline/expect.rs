@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use serde::Serialize;
 
-use super::{Action, Expectation, Quantity, due, in_order, surface_number, tick_at};
+use super::{Action, Expectation, Quantity, due, in_order, tick_at};
 use crate::clock::WeatheringClock;
 use crate::matter::SurfaceMatter;
 use crate::matter::wash::GRAIN_DENSITY;
@@ -43,7 +43,7 @@ impl Expectations {
             // Before the first tick there is nothing to see.
             all.ticks.push(tick_at(spec.at, scenario.tick_hz).max(1));
             let surface = expectation.surface.as_deref();
-            all.surfaces.push(surface.and_then(|name| surface_number(scenario, name)));
+            all.surfaces.push(surface.and_then(|name| scenario.surface_number(name)));
             let expectation = expectation.clone();
             all.outcomes.push(ExpectationOutcome {
                 event,

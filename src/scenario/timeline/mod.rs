@@ -16,7 +16,7 @@ mod expect;
 use bevy::prelude::*;
 
 use super::motion::{EmitterMotion, Leg, pose};
-use super::{CameraKey, EmitterKey, EmitterSpec, Scenario};
+use super::{CameraKey, EmitterKey, EmitterSpec, MadeOf, Scenario};
 use crate::brush::Brush;
 use crate::material::{PorousMaterial, StandingWater};
 use crate::weather::Weather;
@@ -127,10 +127,6 @@ pub(crate) fn weather_is_changing(scenario: &Scenario, tick: u32) -> bool {
     changes.iter().any(|step| step.last > step.first && (step.first..=step.last).contains(&tick))
 }
 
-fn surface_number(scenario: &Scenario, name: &str) -> Option<u32> {
-    scenario.surfaces.iter().position(|surface| surface.name == name).map(|index| index as u32)
-}
-
 impl WeatherStep {
     /// The change of `from` that begins with tick `first`.
     fn new(change: &WeatherChange, from: Weather, first: u32, hz: u32) -> Self {
@@ -183,7 +179,7 @@ impl Timeline {
                     timeline.changes.push(step);
                 }
                 Action::Brush(event) => {
-                    let surface = event.surface.as_deref().and_then(|name| surface_number(scenario, name));
+                    let surface = event.surface.as_deref().and_then(|name| scenario.surface_number(name));
                     timeline.strokes.push(BrushStep { tick, brush: event.brush(), surface });
                 }
                 Action::Material(change) => timeline.add_material(scenario, change, tick),
@@ -198,16 +194,15 @@ impl Timeline {
     }
 
     fn add_material(&mut self, scenario: &Scenario, change: &MaterialChange, tick: u32) {
-        let Some(surface) = surface_number(scenario, &change.surface) else { return };
+        let Some(surface) = scenario.surface_number(&change.surface) else { return };
         let made_of = |name: &String| {
             let index = scenario.materials.keys().position(|other| other == name)?;
             Some((index, scenario.materials.get(name)?))
         };
         let current = self.materials.iter().rev().find(|step| step.surface == surface).cloned();
         let current = current.or_else(|| {
-            let (index, spec) = made_of(&scenario.surfaces[surface as usize].material)?;
-            let (porous, water) = (spec.porous, spec.water);
-            let first = MaterialStep { tick: 0, surface, material: Some(index), porous, water };
+            let MadeOf { material, porous, water } = scenario.made_of(surface)?;
+            let first = MaterialStep { tick: 0, surface, material, porous, water };
             self.materials.push(first.clone());
             Some(first)
         });

@@ -6,12 +6,16 @@
 //! URIs, or files beside the glTF; what lies outside its folder is not read. An accessor without a buffer view,
 //! zero but for a sparse part, is refused: a few bytes could ask for any amount of memory.
 //!
+//! [`read_meshes`] has the shapes of a scene, a mesh for each node; [`read_layout`] has its nodes and primitives without their
+//! numbers, for those who have them loaded by Bevy.
+//!
 //! What this does not do: skins and morph targets stay in their bind pose, compressed meshes are refused,
 //! materials are not looked at.
 //!
 //! Khronos Group 2021, *glTF 2.0 specification*.
 
 mod file;
+mod layout;
 mod uri;
 
 use std::path::{Path, PathBuf};
@@ -20,6 +24,8 @@ use bevy::math::{Affine3A, Mat4};
 use bevy::mesh::Mesh;
 
 use self::file::GltfFile;
+pub(crate) use self::layout::plain_name;
+pub use self::layout::{SceneLayout, SceneNode, ScenePart, SceneSkin, read_layout, read_parts};
 pub(crate) use self::uri::{data_uri, percent_decoded, read_capped, read_uri};
 use crate::collision::MeshTriangles;
 

@@ -85,14 +85,10 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
     .init_resource::<TrackSources>()
     .insert_resource(AssetTree(loaded.tree.clone()))
     .add_plugins(scenario);
-    let is_model = model::is_model(&arguments.file);
-    model::light_shade(app.world_mut(), is_model);
-    if is_model {
-        model::spawn(app.world_mut(), &loaded);
-    }
+    model::light_shade(app.world_mut(), model::is_model(&arguments.file));
     let effects = app.world().resource::<EffectTable>().rows().len();
     let exit = app
-        .insert_resource(open::Opened { loaded, is_model, effects })
+        .insert_resource(open::Opened { loaded, effects })
         .insert_resource(shots::OutFolder(arguments.out.clone()))
         .insert_resource(begun)
         .add_plugins((ui::plugin, settings::plugin, selection::plugin, camera::plugin))
@@ -102,7 +98,6 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
             keys::plugin,
             title::plugin,
             open::plugin,
-            model::plugin,
             saving::plugin,
             leave::plugin,
             reveal::plugin,

@@ -18,10 +18,8 @@ use super::{export, model, record, saving, split};
 /// What is open.
 #[derive(Resource)]
 pub struct Opened {
-    /// The scenario, or the bare one around a model.
+    /// The scenario, or that of a model by itself.
     pub loaded: LoadedScenario,
-    /// It is a model by itself.
-    pub is_model: bool,
     /// Rows of the effect table that belong to it.
     pub effects: usize,
 }
@@ -41,16 +39,17 @@ pub fn plugin(app: &mut App) {
     app.init_resource::<Opening>().add_systems(Update, (take_dropped, finish, tell_failure));
 }
 
-/// Reads a scenario, or what stands for one around a model.
+/// Reads a scenario, or makes the one of a model by itself.
 ///
 /// # Errors
 /// What is wrong, with the file.
 pub fn load(file: &Path, variant: Option<&str>) -> Result<LoadedScenario, String> {
-    if model::is_model(file) {
-        model::bare_scenario(file)
+    let loaded = if model::is_model(file) {
+        LoadedScenario::of_model(file)
     } else {
-        Scenario::load_variant(file, variant).map_err(|error| error.to_string())
-    }
+        Scenario::load_variant(file, variant)
+    };
+    loaded.map_err(|error| error.to_string())
 }
 
 /// Begins to open a file. One that is being opened already is given up.
@@ -76,11 +75,8 @@ fn finish(world: &mut World) {
             split::end(world);
             switch_scenario(world, prepared);
             model::light_shade(world, is_model);
-            if is_model {
-                model::spawn(world, &loaded);
-            }
             let effects = world.resource::<EffectTable>().rows().len();
-            world.insert_resource(Opened { loaded, is_model, effects });
+            world.insert_resource(Opened { loaded, effects });
             world.resource_mut::<Note>().tell(format!("opened {}", file.display()));
         }
         Some(Err(error)) => world.resource_mut::<Note>().complain(error),
@@ -132,5 +128,7 @@ mod tests {
         }
         let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/scenarios/hose.ron");
         assert!(!load(&scenario, None).unwrap().scenario.surfaces.is_empty());
+        let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models/bunny_1000.glb");
+        assert_eq!(load(&model, None).unwrap().scenario.surface_count(), 1);
     }
 }

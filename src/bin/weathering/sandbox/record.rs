@@ -122,9 +122,6 @@ fn toggle(world: &mut World) {
 
 /// Why nothing can be recorded.
 fn obstacle(world: &World) -> Option<&'static str> {
-    if world.resource::<Opened>().is_model {
-        return Some("A model that was opened by itself has no scenario to be recorded as.");
-    }
     if world.contains_resource::<Split>() {
         return Some("End the comparison first: the copy is no part of the scenario.");
     }
@@ -192,7 +189,7 @@ fn start(world: &mut World, base: LoadedScenario, prepared: PreparedScenario) {
         }
     }
     let effects = world.resource::<EffectTable>().rows().len();
-    world.insert_resource(Opened { loaded: base.clone(), is_model: false, effects });
+    world.insert_resource(Opened { loaded: base.clone(), effects });
     let told = format!("recording into {}", base.file.display());
     record::begin(world, base);
     world.insert_resource(LastView::default());

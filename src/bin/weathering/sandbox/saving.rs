@@ -157,11 +157,7 @@ fn obstacle(world: &mut World) -> Option<&'static str> {
     if export::is_reading(world) {
         return Some("Wait until the scene is read for the export.");
     }
-    let opened = world.resource::<Opened>();
-    if opened.is_model {
-        return Some("A model that was opened by itself has no scenario to be saved with.");
-    }
-    let rows = opened.effects;
+    let rows = world.resource::<Opened>().effects;
     if world.contains_resource::<Recording>() {
         return Some("End the recording first: it keeps moments of its own.");
     }
@@ -210,8 +206,7 @@ pub fn show(ui: &mut egui::Ui, world: &mut World) {
             }
         }
     }
-    let is_alone = !world.resource::<Opened>().is_model
-        && !world.contains_resource::<Split>()
+    let is_alone = !world.contains_resource::<Split>()
         && !world.contains_resource::<Recording>()
         && !added::is_any(world);
     let is_saved = is_alone && path.join("state.ron").is_file();
