@@ -190,6 +190,7 @@ mod tests {
     use std::path::Path;
 
     use serde_json::{Value, json};
+    use tempfile::TempDir;
 
     use super::*;
 
@@ -222,7 +223,7 @@ mod tests {
         scenes: &str,
         events: &str,
         edit: impl FnOnce(&mut Value),
-    ) -> Result<LoadedScenario, String> {
+    ) -> Result<(LoadedScenario, TempDir), String> {
         let folder = tempfile::tempdir().unwrap();
         write_model(folder.path(), edit);
         let text = format!(
@@ -242,16 +243,16 @@ mod tests {
         let meshes = loaded.surface_meshes().map_err(|error| error.to_string())?;
         assert!(meshes.iter().map(|(name, ..)| name.as_str()).eq(loaded.scenario.surface_names()));
         assert_eq!(loaded.named_files().unwrap().len(), 2);
-        Ok(loaded)
+        Ok((loaded, folder))
     }
 
-    fn load(scenes: &str) -> Result<LoadedScenario, String> {
+    fn load(scenes: &str) -> Result<(LoadedScenario, TempDir), String> {
         load_with(scenes, "", |_| {})
     }
 
     #[test]
     fn surfaces_of_scenes_come_behind_the_others_by_their_nodes() {
-        let loaded = load(
+        let (loaded, _folder) = load(
             r#"(name: "a", file: "model.gltf"),
             (name: "b", file: "model.gltf", position: (0.0, 0.0, 3.0), scale: (2.0, 2.0, 2.0),
              porous: (sorptivity: 0.25), maps: (map_size: 64))"#,
