@@ -28,7 +28,7 @@ pub use paint::{BrushSurfaces, paint_strokes};
 /// What a brush does.
 #[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum BrushKind {
-    /// Brings water, as a film. Strength: its depth in the middle, mm.
+    /// Brings water: fills the pores as far as they have room, and the rest lies as a film. Strength: its depth in the middle, mm.
     Wet,
     /// Takes water away, from the surface and out of the pores. Strength: the part of it in the middle, 0..=1.
     Dry,

@@ -100,6 +100,8 @@ fn entry(file: PathBuf) -> Entry {
 
 fn show(ui: &mut egui::Ui, world: &mut World) {
     let opened = world.resource::<Opened>().loaded.file.clone();
+    // A name alone has no folder.
+    let opened = std::path::absolute(&opened).unwrap_or(opened);
     if let Some(file) = world.resource::<Opening>().file() {
         let text = format!("opening {}", file.display());
         ui.horizontal(|ui| {
