@@ -55,6 +55,9 @@ pub const MOST_LOAD: f32 = 0.2;
 /// The same in 1/65,536, of what floats.
 const AFLOAT_LOAD: u16 = (MOST_LOAD * 65_536.0) as u16;
 
+/// Parts of water to one of grains in what drips as mud.
+pub(crate) const MUDDY_WATER: u32 = 3;
+
 /// Snow, in mm of water, under which splashes do not get at the soil.
 const SHELTER_MM: f64 = 0.1;
 
@@ -121,18 +124,24 @@ pub(crate) fn carry_dust(water: &mut SurfaceWater, matter: &mut SurfaceMatter, m
     matter.move_dust(moved.from, moved.to, part(dust, moved.load).max(afloat), afloat);
 }
 
-/// Takes loose grains off the surface with water that leaves it. `film`: of the texel before it left; units.
+/// Takes loose grains off the surface with a drop that falls: whole nanolitres of them, which it returns, no more than fit into
+/// [muddy drips](crate::wetting::muddy_drip_effect). `water_nl` of the drop; `film`: of the texel before it left, units.
 pub(crate) fn wash_off(
     water: &mut SurfaceWater,
     matter: &mut SurfaceMatter,
     texel: u32,
-    units: u64,
+    water_nl: u32,
     film: u32,
-) {
+) -> u32 {
     bind_dried(water, matter);
     let dust = matter.texels[texel as usize].dust;
-    let units = u32::try_from(units).unwrap_or(u32::MAX);
-    matter.wash_off(texel, dissolved(dust, units, film));
+    let units = u32::try_from(water.units.from_nl(u64::from(water_nl))).unwrap_or(u32::MAX);
+    let soil_nl = water.units.whole_nl(dissolved(dust, units, film));
+    // With their water they are a particle, whose volume is a u32.
+    let most_nl = (water_nl / MUDDY_WATER).min(u32::MAX / (MUDDY_WATER + 1));
+    let soil_nl = u32::try_from(soil_nl).unwrap_or(u32::MAX).min(most_nl);
+    matter.wash_off(texel, water.units.from_nl(u64::from(soil_nl)));
+    soil_nl
 }
 
 /// Grains in `units` of a film that holds `dust`, evenly.
@@ -224,8 +233,16 @@ mod tests {
         assert_eq!((ground.matter.texels[5].dust, ground.matter.texels[6].dust), (750, 250));
         carry_dust(&mut ground.water, &mut ground.matter, Moved { load: 6554, ..moved });
         assert_eq!((ground.matter.texels[5].dust, ground.matter.texels[6].dust), (710, 290));
-        wash_off(&mut ground.water, &mut ground.matter, 6, 1600, 1600);
-        assert_eq!((ground.matter.texels[6].dust, ground.matter.ledger.washed_off), (0, 290));
+        // A drop takes whole nanolitres, and of very muddy water a third of its own.
+        let units = |nl: u64| ground.water.units.from_nl(nl);
+        let (whole, third) = (290 / units(1), units(33));
+        assert_eq!(wash_off(&mut ground.water, &mut ground.matter, 6, 1000, 100), whole as u32);
+        let washed_off = ground.matter.ledger.washed_off;
+        assert_eq!(washed_off, whole * ground.water.units.from_nl(1));
+        assert_eq!(u64::from(ground.matter.texels[6].dust), 290 - washed_off);
+        ground.matter.receive(6, MatterKind::Dust, 1_000_000);
+        assert_eq!(wash_off(&mut ground.water, &mut ground.matter, 6, 100, 100), 33);
+        assert_eq!(ground.matter.ledger.washed_off, washed_off + third);
         assert_balanced(&ground.matter);
     }
 

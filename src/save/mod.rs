@@ -40,7 +40,7 @@ pub use error::SaveError;
 pub use maps::ColorMaps;
 
 /// The version that is written. Others are refused.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 
 /// A scene at a moment between two ticks.
 #[derive(Debug, Clone)]
