@@ -62,6 +62,10 @@ fn assert_accounted(scene: &Scene, surface: Entity) {
 fn rain_washes_dust_down_a_slope_and_off_it() {
     let mut scene = Scene::new(HZ);
     let slope = slab(&mut scene, 30.0);
+    // What drips off its lower edge comes down here.
+    let glazed = PorousMaterial { capacity_mm: 0.0, retained_mm: 0.05, ..default() };
+    let sheet = ground(Vec2::ONE, UVec2::splat(4)).unwrap();
+    let below = scene.surface(sheet, 64, glazed, Transform::from_xyz(0.0, -0.6, 0.0));
     fall(&mut scene, Carries::Dust, 400.0, 3);
     let fallen = litres(&scene, slope, |stock| stock.dust);
     // A third of a millimetre on two thirds of a square metre.
@@ -71,7 +75,10 @@ fn rain_washes_dust_down_a_slope_and_off_it() {
     let ledger = matter(&scene, slope).ledger();
     let washed = scene.water(slope).units().mm3(ledger.washed_off) * 1e-6;
     assert!(washed > 0.05 * fallen, "{washed} of {fallen}");
+    let caught = scene.water(below).units().mm3(matter(&scene, below).ledger().received_mud) * 1e-6;
+    assert!(caught > 0.2 * washed && caught <= washed, "{caught} of {washed}");
     assert_accounted(&scene, slope);
+    assert_accounted(&scene, below);
 }
 
 /// An effect that comes with the library, in the scene.

@@ -87,7 +87,7 @@ pub fn snow_fall_effect() -> WeatherEffect {
 /// Metres from the surface at which a drop starts.
 const CLEARANCE: f32 = 0.003;
 /// Grains with which a drip is muddy, nanolitres: with less they are lost on the way.
-const LEAST_SOIL_NL: u32 = 25;
+const LEAST_SOIL_NL: u32 = 10;
 /// Seconds a drip may fall.
 const LIFETIME: f32 = 6.0;
 
