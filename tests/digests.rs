@@ -9,8 +9,8 @@ use serde_json::Value;
 
 use super::replay::{number, read_report, replay, run};
 
-/// Scenarios that together have rain, mud and snow, and as many seconds of them as it takes until much has been hit.
-const RUNS: [(&str, &str); 3] = [("shower", "2.5"), ("mud", "1.5"), ("snow", "3")];
+/// Scenarios that together have rain, mud, snow, and a jet on dust, and as many seconds of them as it takes until much has been hit.
+const RUNS: [(&str, &str); 4] = [("shower", "2.5"), ("mud", "1.5"), ("snow", "3"), ("wash", "7")];
 
 /// What a run came to: the report without what differs from run to run, and all maps.
 struct Findings {

@@ -207,7 +207,7 @@ fn saved_scenes_that_do_not_fit_are_refused_by_file_and_field() {
     let state = kept.join("state.ron");
     let text = fs::read_to_string(&state).unwrap();
     for (was, is, named) in [
-        ("version: 2", "version: 9", "`version` is 9"),
+        ("version: 3", "version: 9", "`version` is 9"),
         ("hz: 20", "hz: 60", "`hz` is 60"),
         ("name: \"roof\"", "name: \"../roof\"", "`surfaces[0].name`"),
         ("size: 64", "size: 65", "`surfaces[0].size`"),

@@ -43,6 +43,9 @@ pub struct WeatherEffect {
     /// Part of its water that an impact throws up again as two drops, 0..=0.5, if its drops are so large and fast that they
     /// splash ([`splashes`](drops::splashes)). Only where it carries nothing but water.
     pub splash: f32,
+    /// Whether its particles are pieces of one jet, as of a hose, and not drops: where they hit they push the film aside, and
+    /// sweep along outwards and forwards what they lift ([`matter::jet`](crate::matter::jet)).
+    pub jet: bool,
     /// Multiplies gravity: 1 falls, 0 floats.
     pub gravity_scale: f32,
     /// Shapes of the mark on the surface. Of an effect made in code, stamps of a kind are made when it is first used.
@@ -165,6 +168,7 @@ impl Default for WeatherEffect {
             terminal_speed: None,
             flutter: 0.0,
             splash: 0.0,
+            jet: false,
             gravity_scale: 1.0,
             stamps: StampSource::default(),
             stamp_radius: None,

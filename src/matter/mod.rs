@@ -3,8 +3,8 @@
 //! Each texel holds three amounts beside its water ([`TexelMatter`]), in the same whole units. Impacts leave [`Deposit`]s,
 //! shared out under their stamps as water is (`settle`). From then on:
 //!
-//! - water takes soil along: drops loosen it, films carry what is loose, drips take it off the surface, and a film that dries
-//!   up leaves a crust ([`wash`]);
+//! - water takes soil along: drops lift and loosen it, films carry what is loose, drips take it off the surface, and a film that
+//!   dries up leaves a crust ([`wash`]); a jet sweeps it aside ([`jet`]);
 //! - snow lies where it is cold ([`snow`]), slides where it is steep, and piles up below ([`slide`]);
 //! - what melts is water on the same texel, to the unit.
 //!
@@ -16,6 +16,7 @@
 //! Not here: wind that lifts dust or drifts snow; ice; layers, so that snow is drawn over soil, whichever came first.
 
 mod advance;
+pub mod jet;
 pub mod look;
 mod settle;
 pub mod slide;

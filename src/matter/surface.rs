@@ -18,6 +18,9 @@ pub struct SurfaceMatter {
     pub(crate) size: u32,
     /// Row by row.
     pub(crate) texels: Vec<TexelMatter>,
+    /// Of the loose grains of each texel those that float in its film, units; never more than there are. Empty until the first
+    /// are lifted.
+    stirred: Vec<u32>,
     pub(crate) tiles: MatterTiles,
     pub(crate) ledger: MatterLedger,
 }
@@ -105,10 +108,11 @@ impl MatterTiles {
 }
 
 impl SurfaceMatter {
-    /// As it was saved. `flags`: those of each tile.
+    /// As it was saved. `stirred`: of each texel, or empty; `flags`: those of each tile.
     pub(crate) fn from_saved(
         size: u32,
         texels: Vec<TexelMatter>,
+        mut stirred: Vec<u32>,
         flags: &[u8],
         ledger: MatterLedger,
     ) -> Self {
@@ -121,7 +125,11 @@ impl SurfaceMatter {
                 tiles.melt(tile as u32);
             }
         }
-        Self { size, texels, tiles, ledger }
+        // Of a stranger's folder.
+        for (stirred, texel) in stirred.iter_mut().zip(&texels) {
+            *stirred = (*stirred).min(texel.dust);
+        }
+        Self { size, texels, stirred, tiles, ledger }
     }
 
     /// Flags of each tile.
@@ -132,6 +140,11 @@ impl SurfaceMatter {
     /// The texels, row by row; empty while nothing has come.
     pub fn texels(&self) -> &[TexelMatter] {
         &self.texels
+    }
+
+    /// Of the loose grains of each texel, row by row, those that float in its film; units. Empty while none has been lifted.
+    pub fn stirred(&self) -> &[u32] {
+        &self.stirred
     }
 
     /// What has become of it.
@@ -146,7 +159,9 @@ impl SurfaceMatter {
 
     /// Bytes it holds.
     pub fn bytes(&self) -> usize {
-        self.texels.capacity() * size_of::<TexelMatter>() + self.tiles.flags.capacity()
+        self.texels.capacity() * size_of::<TexelMatter>()
+            + self.stirred.capacity() * size_of::<u32>()
+            + self.tiles.flags.capacity()
     }
 
     /// Sum over all texels.
@@ -195,20 +210,61 @@ impl SurfaceMatter {
     /// Loose grains become bound soil.
     pub(crate) fn bind(&mut self, texel: u32, units: u64) -> u32 {
         let TexelMatter { dust, mud, .. } = &mut self.texels[texel as usize];
-        pour(dust, mud, units)
+        let bound = pour(dust, mud, units);
+        self.keep_stirred(texel);
+        bound
     }
 
-    /// Bound soil becomes loose grains.
+    /// Bound soil becomes loose grains, which float.
     pub(crate) fn loosen(&mut self, texel: u32, units: u64) -> u32 {
         let TexelMatter { dust, mud, .. } = &mut self.texels[texel as usize];
-        pour(mud, dust, units)
+        let loosened = pour(mud, dust, units);
+        self.lift(texel, loosened);
+        loosened
     }
 
-    /// Loose grains go to another texel.
-    pub(crate) fn move_dust(&mut self, from: u32, to: u32, units: u64) -> u32 {
+    /// Grains of a texel that float.
+    pub(crate) fn stirred_on(&self, texel: u32) -> u32 {
+        self.stirred.get(texel as usize).copied().unwrap_or(0)
+    }
+
+    /// Up to so many of the grains that lie loose float from now on; how many it were.
+    pub(crate) fn stir(&mut self, texel: u32, units: u64) -> u32 {
+        let lying = self.texels[texel as usize].dust - self.stirred_on(texel);
+        let lifted = units.min(u64::from(lying)) as u32;
+        self.lift(texel, lifted);
+        lifted
+    }
+
+    /// So many more float, of those that are there.
+    fn lift(&mut self, texel: u32, units: u32) {
+        if units == 0 {
+            return;
+        }
+        if self.stirred.is_empty() {
+            self.stirred = vec![0; self.texels.len()];
+        }
+        self.stirred[texel as usize] += units;
+    }
+
+    /// No more float than there are.
+    fn keep_stirred(&mut self, texel: u32) {
+        if let Some(stirred) = self.stirred.get_mut(texel as usize) {
+            *stirred = (*stirred).min(self.texels[texel as usize].dust);
+        }
+    }
+
+    /// Loose grains go to another texel, up to so many of them afloat.
+    pub(crate) fn move_dust(&mut self, from: u32, to: u32, units: u64, afloat: u64) -> u32 {
         let mut there = self.texels[to as usize].dust;
         let moved = pour(&mut self.texels[from as usize].dust, &mut there, units);
         self.texels[to as usize].dust += moved;
+        let afloat = afloat.min(u64::from(self.stirred_on(from).min(moved))) as u32;
+        if afloat > 0 {
+            self.stirred[from as usize] -= afloat;
+            self.stirred[to as usize] += afloat;
+        }
+        self.keep_stirred(from);
         moved
     }
 
@@ -223,6 +279,10 @@ impl SurfaceMatter {
     /// Loose grains leave the surface with water.
     pub(crate) fn wash_off(&mut self, texel: u32, units: u64) -> u32 {
         let gone = take(&mut self.texels[texel as usize].dust, units);
+        if let Some(stirred) = self.stirred.get_mut(texel as usize) {
+            // What floats goes first.
+            *stirred = stirred.saturating_sub(gone);
+        }
         self.ledger.washed_off += u64::from(gone);
         gone
     }
@@ -243,6 +303,7 @@ impl SurfaceMatter {
             let units = share(*amount);
             u64::from(take(amount, units))
         });
+        self.keep_stirred(texel);
         self.ledger.wiped += dust + mud;
         self.ledger.wiped_snow += snow;
         dust + mud + snow
@@ -275,7 +336,10 @@ mod tests {
         // Neither goes where there is no room.
         assert_eq!([matter.bind(7, 9), matter.loosen(7, 9)], [0, 0]);
         matter.receive(8, MatterKind::Dust, 50);
-        assert_eq!([matter.move_dust(8, 7, 9), matter.move_dust(7, 8, 9), matter.bind(8, 20)], [0, 9, 20]);
+        assert_eq!(
+            [matter.move_dust(8, 7, 9, 0), matter.move_dust(7, 8, 9, 0), matter.bind(8, 20)],
+            [0, 9, 20]
+        );
         assert_balanced(&matter);
     }
 
@@ -294,6 +358,26 @@ mod tests {
     }
 
     #[test]
+    fn no_more_grains_float_than_there_are() {
+        let mut matter = SurfaceMatter::default();
+        matter.wake(16);
+        matter.receive(3, MatterKind::Dust, 100);
+        assert!(matter.stirred().is_empty());
+        assert_eq!([matter.stir(3, 30), matter.stir(3, 900), matter.stir(3, 1)], [30, 70, 0]);
+        // What goes along afloat is afloat there.
+        assert_eq!(matter.move_dust(3, 4, 50, 20), 50);
+        assert_eq!([matter.stirred_on(3), matter.stirred_on(4)], [50, 20]);
+        matter.bind(3, 10);
+        matter.wash_off(4, 15);
+        assert_eq!([matter.stirred_on(3), matter.stirred_on(4)], [40, 5]);
+        // Of 35 that are left there 5 float.
+        matter.wipe(4, 1.0);
+        assert_eq!((matter.stirred_on(4), matter.stir(4, 9)), (0, 0));
+        assert_eq!((matter.loosen(3, 6), matter.stirred_on(3)), (6, 46));
+        assert_balanced(&matter);
+    }
+
+    #[test]
     fn what_was_saved_goes_on_where_it_was() {
         let mut matter = SurfaceMatter::default();
         matter.wake(32);
@@ -301,8 +385,12 @@ mod tests {
         matter.tiles.melt(1);
         matter.tiles.melt(2);
         matter.tiles.slide(2);
-        let again = SurfaceMatter::from_saved(32, matter.texels.clone(), matter.tile_flags(), matter.ledger);
+        matter.receive(41, MatterKind::Dust, 90);
+        matter.stir(41, 60);
+        let (texels, stirred) = (matter.texels.clone(), matter.stirred.clone());
+        let again = SurfaceMatter::from_saved(32, texels, stirred, matter.tile_flags(), matter.ledger);
         assert_eq!((again.stock(), again.ledger), (matter.stock(), matter.ledger));
+        assert_eq!((again.stirred_on(41), again.stirred_on(40)), (60, 0));
         assert_eq!((again.tiles.melting, again.tiles.sliding), (vec![1, 2], vec![2]));
     }
 }

@@ -123,8 +123,6 @@ impl Ground {
 
     /// So many drops of 2 mm, all over.
     pub(super) fn rain(&mut self, place: &Place, tick: u32, count: u32) {
-        let now = place.now(tick);
-        self.water.wake(false);
         let across = place.geometry.size() * 256;
         for _ in 0..count {
             self.drops += 1;
@@ -132,11 +130,16 @@ impl Ground {
             let along =
                 |step: u32| ((u64::from(self.drops.wrapping_mul(step)) * u64::from(across)) >> 32) as i32;
             let center = [along(3_242_174_889), along(2_447_445_414)];
-            let drop =
-                Drop { center, radius: [384; 2], water_nl: 4189, speed_mm: 6500, source: Source::UNKNOWN };
-            let matter = self.matter.awake(place.geometry.size());
-            soak(&mut self.water, &now, &[drop], &mut self.soak, matter, &place.weather);
+            let (water_nl, speed_mm, source) = (4189, 6500, Source::UNKNOWN);
+            self.pour(place, tick, Drop { center, radius: [384; 2], water_nl, speed_mm, jet: None, source });
         }
+    }
+
+    /// One drop.
+    pub(super) fn pour(&mut self, place: &Place, tick: u32, drop: Drop) {
+        self.water.wake(false);
+        let matter = self.matter.awake(place.geometry.size());
+        soak(&mut self.water, &place.now(tick), &[drop], &mut self.soak, matter, &place.weather);
     }
 
     /// A tick of water and matter; how many tiles took a step.

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::{ReplayOptions, SurfaceMaps};
 use crate::clock::WeatheringClock;
 use crate::collision::ColliderReport;
-use crate::effect::EffectTable;
+use crate::effect::{EffectIndex, EffectTable};
 use crate::emitter::{EmissionSeed, EmitterState, NewParticles};
 use crate::matter::SurfaceMatter;
 use crate::overlay::{MapLoss, MapPool, SurfaceTotals};
@@ -286,10 +286,12 @@ pub(super) fn water_report(world: &World, maps: &[SurfaceAccounts]) -> WaterRepo
     };
     let in_flight: u64 = world.resource::<Particles>().iter().chain(waiting).map(water_of).sum();
     let counts = world.resource::<WaterCounts>();
-    let drips = world.get_resource::<DripEffect>().and_then(|drips| drips.rows).map(|[drop, _]| drop.0);
+    let drips = world.get_resource::<DripEffect>().and_then(|drips| drips.rows);
+    let is_drip =
+        |row: usize| drips.is_some_and(|[drop, _, mud]| [drop, mud].contains(&EffectIndex(row as u16)));
     let expired = |dripped: bool| -> u64 {
         let rows = counts.expired_nl.iter().enumerate();
-        rows.filter(|(row, _)| (drips.map(usize::from) == Some(*row)) == dripped).map(|(_, nl)| nl).sum()
+        rows.filter(|&(row, _)| is_drip(row) == dripped).map(|(_, nl)| nl).sum()
     };
     let mut report = WaterReport {
         emitted_mm3: nl(counts.emitted_nl),

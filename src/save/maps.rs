@@ -20,7 +20,7 @@ use crate::wetting::{Marks, SurfaceWater, TexelWater};
 pub(super) const STATE: &str = "state.ron";
 
 /// The maps of a surface; see [`file`].
-const MAPS: [&str; 14] = [
+const MAPS: [&str; 15] = [
     "diffuse",
     "specular",
     "normal",
@@ -34,6 +34,7 @@ const MAPS: [&str; 14] = [
     "dust",
     "mud",
     "snow",
+    "stirred",
     "heaps",
 ];
 
@@ -165,6 +166,10 @@ fn write_files(scene: &SavedScene, folder: &Path) -> Result<(), SaveError> {
             put("dust", words(&|texel| texel.dust))?;
             put("mud", words(&|texel| texel.mud))?;
             put("snow", words(&|texel| texel.snow))?;
+            if state.stirred {
+                let stirred = surface.matter.stirred();
+                put("stirred", stirred.iter().flat_map(|units| units.to_le_bytes()).collect::<Vec<u8>>())?;
+            }
             let path = file(folder, &state.name, "heaps");
             let flags = surface.matter.tile_flags().iter().flat_map(|&flags| [flags, u8::MAX]).collect();
             write_picture(&path, &square::<LumaA<u8>>(&path, size / TILE_SIZE, flags)?, ImageFormat::Png)?;
@@ -276,9 +281,10 @@ fn read_surface(folder: &Path, state: &SurfaceState) -> Result<SavedSurface, Sav
         let (dust, mud, snow) = (words("dust")?, words("mud")?, words("snow")?);
         let rows = dust.into_iter().zip(mud).zip(snow);
         let texels = rows.map(|((dust, mud), snow)| TexelMatter { dust, mud, snow }).collect();
+        let stirred = if state.stirred { words("stirred")? } else { Vec::new() };
         let bytes = read_png(&file(folder, &state.name, "heaps"), state.size / TILE_SIZE, 2)?;
         let flags: Vec<u8> = bytes.as_chunks::<2>().0.iter().map(|&[flags, _]| flags).collect();
-        matter = SurfaceMatter::from_saved(state.size, texels, &flags, state.matter_ledger);
+        matter = SurfaceMatter::from_saved(state.size, texels, stirred, &flags, state.matter_ledger);
     }
     Ok(SavedSurface { water, matter, colors })
 }

@@ -40,7 +40,7 @@ pub use error::SaveError;
 pub use maps::ColorMaps;
 
 /// The version that is written. Others are refused.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 
 /// A scene at a moment between two ticks.
 #[derive(Debug, Clone)]
@@ -91,6 +91,9 @@ pub(super) struct SurfaceState {
     pub(super) marks: bool,
     /// There are maps of its dust, mud and snow.
     pub(super) matter: bool,
+    /// And of what floats of its dust.
+    #[serde(default)]
+    pub(super) stirred: bool,
     pub(super) matter_ledger: MatterLedger,
     pub(super) ledger: Ledger,
     pub(super) rained_at: u32,
@@ -158,6 +161,7 @@ impl SavedScene {
                 wet: water.is_wet(),
                 marks: !water.marks().is_empty(),
                 matter: !matter.is_empty(),
+                stirred: !matter.stirred().is_empty(),
                 matter_ledger: matter.ledger(),
                 ledger: water.ledger(),
                 rained_at: water.rained_at,

@@ -35,6 +35,7 @@ pub fn amounts_digest<'a>(
         hasher.update(bytemuck::cast_slice(water.texels()));
         hasher.update(bytemuck::cast_slice(water.marks()));
         hasher.update(bytemuck::cast_slice(matter.texels()));
+        hasher.update(bytemuck::cast_slice(matter.stirred()));
     }
     hasher.finalize().to_hex().to_string()
 }

@@ -27,16 +27,22 @@ const TILE_CELLS: usize = (TILE_SIZE * TILE_SIZE) as usize;
 pub(crate) struct Parcel {
     /// Nanolitres.
     pub(crate) nl: u64,
-    /// The highest speed, mm/s.
-    pub(crate) speed_mm: u32,
     /// The texel that was hit: of the last drop. Where the cell lies beside the surface's islands, the water goes there.
     pub(crate) home: u32,
+    /// The highest speed, cm/s.
+    pub(crate) speed_cm: u16,
+    /// Some of it is of a jet.
+    pub(crate) is_jet: bool,
 }
 
 impl Parcel {
     fn add(&mut self, other: Self) {
-        let speed_mm = self.speed_mm.max(other.speed_mm);
-        *self = Self { nl: self.nl + other.nl, speed_mm, home: other.home };
+        *self = Self {
+            nl: self.nl + other.nl,
+            home: other.home,
+            speed_cm: self.speed_cm.max(other.speed_cm),
+            is_jet: self.is_jet | other.is_jet,
+        };
     }
 
     /// What goes to the four halves from the left neighbour's right one to the right neighbour's left one: 1, 3, 3 and 1
@@ -187,11 +193,12 @@ mod tests {
         let mut arrivals = Arrivals::default();
         arrivals.begin(SIZE);
         let across = SIZE >> level;
-        arrivals.add(level, [cell % across, cell / across], Parcel { nl, speed_mm: 7, home: 3 });
+        let parcel = Parcel { nl, home: 3, speed_cm: 7, is_jet: true };
+        arrivals.add(level, [cell % across, cell / across], parcel);
         arrivals.share_out(SIZE, wrap, |texel, _| texel);
         let mut texels = vec![0; (SIZE * SIZE) as usize];
         arrivals.drain(|[x, y], parcel| {
-            assert_eq!((parcel.speed_mm, parcel.home), (7, 3));
+            assert_eq!((parcel.speed_cm, parcel.is_jet, parcel.home), (7, true, 3));
             texels[(y * SIZE + x) as usize] += parcel.nl;
         });
         for grid in &arrivals.grids {

@@ -10,6 +10,7 @@ use crate::collision::{DeformingCollider, MeshTriangles, SurfaceCollider};
 use crate::effect::{Carries, EffectIndex, ParticleLook, Sprite, WeatherEffect};
 use crate::emitter::{NewParticles, Source};
 use crate::matter::FallingSnow;
+use crate::matter::wash::MUDDY_WATER;
 use crate::particle::{Lifespan, Particle};
 
 /// A drop that is about to fall.
@@ -21,6 +22,8 @@ pub struct Drip {
     pub site: DripSite,
     /// Nanolitres.
     pub water_nl: u32,
+    /// Grains that it takes along, nanolitres beside its water.
+    pub soil_nl: u32,
 }
 
 /// Why water leaves a texel.
@@ -32,13 +35,13 @@ pub enum DripSite {
     Overhang,
 }
 
-/// The effects whose particles drips are, and snow that falls off an edge.
+/// The effects whose particles drips are, snow that falls off an edge, and drips with grains in them.
 #[derive(Resource, Debug, Clone, Default)]
 pub struct DripEffect {
     /// Their assets; they may be edited.
-    pub handles: [Handle<WeatherEffect>; 2],
+    pub handles: [Handle<WeatherEffect>; 3],
     /// Their rows; none while there is no [`EffectTable`](crate::effect::EffectTable).
-    pub rows: Option<[EffectIndex; 2]>,
+    pub rows: Option<[EffectIndex; 3]>,
 }
 
 /// A drop of 3.6 mm.
@@ -49,6 +52,16 @@ pub fn drip_effect() -> WeatherEffect {
         stamp_radius: Some(0.011),
         stamp_radius_jitter: 0.3,
         ..default()
+    }
+}
+
+/// A drop with grains in it: a part of them to three of water.
+pub fn muddy_drip_effect() -> WeatherEffect {
+    let water = MUDDY_WATER as f32;
+    WeatherEffect {
+        carries: Carries::Mud(water / (water + 1.0)),
+        look: ParticleLook { color: [0.16, 0.11, 0.07, 0.8], ..default() },
+        ..drip_effect()
     }
 }
 
@@ -73,6 +86,8 @@ pub fn snow_fall_effect() -> WeatherEffect {
 
 /// Metres from the surface at which a drop starts.
 const CLEARANCE: f32 = 0.003;
+/// Grains with which a drip is muddy, nanolitres: with less they are lost on the way.
+const LEAST_SOIL_NL: u32 = 10;
 /// Seconds a drip may fall.
 const LIFETIME: f32 = 6.0;
 
@@ -90,7 +105,7 @@ pub(super) fn shed_drips(
         !drips.0.is_empty() || !snow.0.is_empty()
     };
     order.extend(surfaces.iter().filter(sheds).map(|(entity, ..)| entity));
-    let Some([drop, lump]) = effects.rows else { return };
+    let Some([drop, lump, mud]) = effects.rows else { return };
     order.sort_unstable();
     let ticks_left = (LIFETIME * clock.hz() as f32).min(f32::from(Lifespan::MAX_TICKS)) as u16;
     for &entity in order.iter() {
@@ -115,7 +130,15 @@ pub(super) fn shed_drips(
             });
         };
         for drip in drips.0.drain(..) {
-            shed(drip.site, drip.texel, drip.water_nl, drop);
+            // Its grains come down in a part of its water.
+            let soil_nl = if drip.soil_nl < LEAST_SOIL_NL { 0 } else { drip.soil_nl };
+            let muddy_nl = MUDDY_WATER * soil_nl;
+            if soil_nl > 0 {
+                shed(drip.site, drip.texel, muddy_nl + soil_nl, mud);
+            }
+            if drip.water_nl > muddy_nl {
+                shed(drip.site, drip.texel, drip.water_nl - muddy_nl, drop);
+            }
         }
         for fall in snow.0.drain(..) {
             let volume_nl = u32::try_from(water.units.whole_nl(u64::from(fall.units))).unwrap_or(u32::MAX);

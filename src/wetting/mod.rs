@@ -63,7 +63,7 @@ use crate::effect::{EffectTable, WeatherEffect};
 use crate::overlay::Weatherable;
 use crate::schedule::{WeatheringSystems, WeatheringTick};
 
-pub use drip::{Drip, DripEffect, DripSite, drip_effect, snow_fall_effect};
+pub use drip::{Drip, DripEffect, DripSite, drip_effect, muddy_drip_effect, snow_fall_effect};
 pub use exposure::{Exposure, ExposureProgress};
 pub use geometry::{Link, Side, TexelGeometry};
 pub use marks::Marks;
@@ -147,19 +147,22 @@ impl Plugin for WettingPlugin {
                     query::watch_wetness.in_set(WeatheringSystems::Flow).after(drip::shed_drips),
                 ),
             );
-        let shed = [drip_effect(), snow_fall_effect()];
+        let shed = [drip_effect(), snow_fall_effect(), muddy_drip_effect()];
         let handles = match app.world_mut().get_resource_mut::<Assets<WeatherEffect>>() {
             Some(mut effects) => shed.each_ref().map(|effect| effects.add(effect.clone())),
-            // Two that differ: the table knows effects by their handles.
-            None => [1, 2].map(|number| {
+            // Three that differ: the table knows effects by their handles.
+            None => [1, 2, 3].map(|number| {
                 let number = 0x7765_6174_6865_7200 + number;
                 Handle::Uuid(bevy::asset::uuid::Uuid::from_u128(number), std::marker::PhantomData)
             }),
         };
         if let Some(mut table) = app.world_mut().get_resource_mut::<EffectTable>() {
-            let [drop, lump] = shed;
-            let rows = table.insert(handles[0].clone(), drop).zip(table.insert(handles[1].clone(), lump));
-            app.insert_resource(DripEffect { handles, rows: rows.map(|(drop, lump)| [drop, lump]) });
+            let [drop, lump, mud] = shed;
+            let drop = table.insert(handles[0].clone(), drop);
+            let lump = table.insert(handles[1].clone(), lump);
+            let mud = table.insert(handles[2].clone(), mud);
+            let rows = drop.zip(lump).zip(mud).map(|((drop, lump), mud)| [drop, lump, mud]);
+            app.insert_resource(DripEffect { handles, rows });
         }
     }
 }

@@ -241,11 +241,10 @@ fn let_go(
     let taken = u32::try_from(units).unwrap_or(u32::MAX);
     let Some(left) = before.checked_sub(taken) else { return };
     water.texels[texel as usize].film = left;
-    if let Some(matter) = matter {
-        wash_off(water, matter, texel, units, before.saturating_sub(gone).max(taken));
-    }
+    let soil_nl = matter
+        .map_or(0, |matter| wash_off(water, matter, texel, water_nl, before.saturating_sub(gone).max(taken)));
     water.ledger.dripped += units;
-    drips.push(Drip { texel, site, water_nl });
+    drips.push(Drip { texel, site, water_nl, soil_nl });
     wake_uphill(water, now, texel, tile);
 }
 

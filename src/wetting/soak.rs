@@ -12,6 +12,7 @@ use super::flow::LEAST_RETAINED;
 use super::surface::{Now, SurfaceWater, Tiles};
 use crate::emitter::Source;
 use crate::matter::SurfaceMatter;
+use crate::matter::jet::sweep;
 use crate::matter::snow::rain_on_snow;
 use crate::matter::wash::splash;
 use crate::overlay::Splat;
@@ -27,8 +28,11 @@ pub struct Drop {
     pub radius: [i32; 2],
     /// Nanolitres.
     pub water_nl: u32,
-    /// Speed at which it came, mm/s: what it loosens.
+    /// Speed at which it came, mm/s, less what its drops need to move a grain at all
+    /// ([`loosening_speed`](crate::matter::wash::loosening_speed)): what it loosens.
     pub speed_mm: u32,
+    /// If it is of a jet: how far that carries forwards what it sweeps along, 1/256 texel along u and v.
+    pub jet: Option<[i32; 2]>,
     /// Where it came from; unknown unless [sources are tracked](crate::emitter::TrackSources).
     pub source: Source,
 }
@@ -108,6 +112,9 @@ pub(crate) fn soak(
         }
         put(water, now, texel, parcel, matter.as_deref_mut(), weather);
     });
+    if let Some(matter) = matter {
+        drops.iter().for_each(|drop| sweep(water, matter, now, drop));
+    }
     name_sources(water, hits, wetted);
     water.rained_at = now.tick;
 }
@@ -170,6 +177,9 @@ fn gather(
     let (size, wrap) = (water.size >> level, water.wrap);
     let axes = [stamp.axis(0, size, wrap), stamp.axis(1, size, wrap)];
     let home = hit_texel(now, drop, water.size);
+    // Six hundred metres a second are more than anything falls at.
+    let speed_cm = u16::try_from(drop.speed_mm / 10).unwrap_or(u16::MAX);
+    let is_jet = drop.jet.is_some();
     columns.clear();
     columns.extend(stamp.texels(0, size, wrap).map(|x| (x, axis_coverage(axes[0], x as i32))));
     for y in stamp.texels(1, size, wrap) {
@@ -177,7 +187,7 @@ fn gather(
         for &(x, column) in &*columns {
             let nl = u64::from(share(in_row, column));
             if nl > 0 {
-                let (cell, parcel) = ([x, y], Parcel { nl, speed_mm: drop.speed_mm, home });
+                let (cell, parcel) = ([x, y], Parcel { nl, home, speed_cm, is_jet });
                 arrivals.add(level, if level == 0 { to_texel(cell, parcel) } else { cell }, parcel);
             }
         }
@@ -196,7 +206,8 @@ fn put(
     let tile = water.add(now, texel, units);
     note_arrival(water, now, texel, tile);
     if let Some(matter) = matter {
-        splash(water, matter, now, texel, units, f64::from(parcel.speed_mm) * 1.0e-3);
+        let speed = f64::from(parcel.speed_cm) * 0.01;
+        splash(water, matter, now, texel, units, speed, parcel.is_jet);
         rain_on_snow(water, matter, now, weather, texel, units);
     }
 }
@@ -247,7 +258,7 @@ mod tests {
 
     /// Water so many texels from its middle to its rim, as a drop at a point of the map in 1/256 texel.
     fn drop_at(center: [i32; 2], radius: i32, water_nl: u32) -> Drop {
-        Drop { center, radius: [radius * 256; 2], water_nl, speed_mm: 0, source: Source::UNKNOWN }
+        Drop { center, radius: [radius * 256; 2], water_nl, speed_mm: 0, jet: None, source: Source::UNKNOWN }
     }
 
     /// What a dry surface that takes up nothing holds after one tick.

@@ -18,6 +18,7 @@ const IMAGES: &str = r#"(
     terminal_speed: 6.0,
     flutter: 0.2,
     splash: 0.1,
+    jet: true,
     stamps: Images(diffuse: "stamp.png", specular: None, normal: "stamp.png", variants: 4),
     stamp_radius: 0.02,
     stamp_turn: Flight,

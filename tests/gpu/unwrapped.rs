@@ -91,8 +91,8 @@ impl Scene {
         let (low, high) =
             corners.iter().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(l, h), &uv| (l.min(uv), h.max(uv)));
         let center = ((low + high) / 2.0 * SIZE as f32 * 256.0).as_ivec2().to_array();
-        let drop =
-            Drop { center, radius: [10 * 256; 2], water_nl: 12_000_000, speed_mm: 0, source: default() };
+        let (water_nl, speed_mm, source) = (12_000_000, 0, default());
+        let drop = Drop { center, radius: [10 * 256; 2], water_nl, speed_mm, jet: None, source };
         world.get_mut::<DropQueue>(self.cube).unwrap().0.push(drop);
         self.app.insert_resource(TimeUpdateStrategy::FixedTimesteps(10));
         (0..4).for_each(|_| update(&mut self.app));

@@ -90,6 +90,7 @@ impl Scene {
             radius: [radius * 256; 2],
             water_nl,
             speed_mm: 0,
+            jet: None,
             source: Source::UNKNOWN,
         });
     }

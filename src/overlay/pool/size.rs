@@ -23,13 +23,14 @@ pub(super) struct Falling {
 impl Falling {
     /// By effects that are in use, and by those that are loaded and may come into use.
     fn new(table: &EffectTable, loaded: Option<&Assets<WeatherEffect>>, drips: Option<&DripEffect>) -> Self {
-        // Lumps of snow fall only where snow has come.
-        let is_lump =
-            |effect: AssetId<WeatherEffect>| drips.is_some_and(|drips| drips.handles[1].id() == effect);
+        // Lumps of snow and muddy drips fall only where snow and soil have come.
+        let is_shed = |effect: AssetId<WeatherEffect>| {
+            drips.is_some_and(|drips| drips.handles[1..].iter().any(|handle| handle.id() == effect))
+        };
         let in_use = table.rows().iter().filter_map(|row| Some((row.handle.id(), row.effect.as_ref()?)));
         let mut falling = Self::default();
         for (id, effect) in in_use.chain(loaded.into_iter().flat_map(|loaded| loaded.iter())) {
-            if !is_lump(id) {
+            if !is_shed(id) {
                 falling.paint |= effect.paints();
                 falling.solids |= effect.carries != Carries::Water;
             }

@@ -182,6 +182,8 @@ fn edit(ui: &mut egui::Ui, effect: &mut WeatherEffect) {
     number(ui, "jitter", &mut effect.stamp_radius_jitter, (0.0, 0.9), "Radius times 1 plus or minus this");
     number(ui, "stretch", &mut effect.stamp_stretch, (0.0, 7.0), "How much longer than wide, aslant");
     number(ui, "splash", &mut effect.splash, (0.0, 0.5), "Part of the water that is thrown up again");
+    ui.checkbox(&mut effect.jet, "jet")
+        .on_hover_text("Pushes the film aside where it hits, and sweeps along what is loose");
     number(ui, "bump", &mut effect.bump, (-1.0, 1.0), "Sine of the slope at its rim");
     for (label, paint) in [("colour", &mut effect.diffuse), ("gloss", &mut effect.specular)] {
         ui.horizontal(|ui| {
