@@ -7,6 +7,7 @@ use bevy::prelude::*;
 
 use super::bvh::{BoxBvh, Segment};
 use super::clearance::Clearance;
+use super::triangles::FARTHEST;
 use super::{DeformingCollider, LocalHit, Shape, SurfaceCollider};
 
 /// Every surface that can be hit, where it is now. Its change detection is about the rigid ones.
@@ -58,7 +59,7 @@ pub struct SceneHit {
 
 impl CollisionScene {
     /// A scene of these surfaces. Order matters for nothing but ties. What cannot be inverted (a scale of 0), is not
-    /// finite, or has nothing that can be hit is left out.
+    /// finite, is farther than 1e9 m from the origin, or has nothing that can be hit is left out.
     pub fn new<S: Into<Shape>>(surfaces: impl IntoIterator<Item = (Entity, Affine3A, S)>) -> Self {
         let surfaces = surfaces.into_iter().map(|(surface, at, shape)| (surface, at, shape.into()));
         let (deforming, rigid): (Vec<_>, Vec<_>) =
@@ -147,10 +148,13 @@ impl Part {
         for (surface, world_from_mesh, shape) in surfaces {
             let volume = world_from_mesh.matrix3.determinant();
             let is_placed = world_from_mesh.is_finite() && volume.is_finite() && volume != 0.0;
-            if let Some(bounds) = shape.bounds()
+            let bounds = shape.bounds().map(|bounds| bounds_in_world(bounds, &world_from_mesh));
+            // Boxes whose areas overflow make no tree.
+            let is_near = |(low, high): &(Vec3, Vec3)| low.abs().max(high.abs()).max_element() <= FARTHEST;
+            if let Some(bounds) = bounds.filter(is_near)
                 && is_placed
             {
-                boxes.push(bounds_in_world(bounds, &world_from_mesh));
+                boxes.push(bounds);
                 let mesh_from_world = world_from_mesh.inverse();
                 instances.push(Instance { surface, world_from_mesh, mesh_from_world, shape });
             }

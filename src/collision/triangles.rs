@@ -18,6 +18,9 @@ pub struct MeshTriangles {
     pub report: TriangleReport,
 }
 
+/// What is farther from the origin, in any direction, is as good as infinite: squares of areas no longer fit an `f32`.
+pub(super) const FARTHEST: f32 = 1.0e9;
+
 /// How many triangles a mesh has, and how many of them cannot be hit.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct TriangleReport {
@@ -25,7 +28,7 @@ pub struct TriangleReport {
     pub total: u32,
     /// Zero area, or two corners in one point.
     pub degenerate: u32,
-    /// A position or uv that is NaN or infinite.
+    /// A position or uv that is NaN or infinite, or a position farther than 1e9 from the origin: squares of its areas would be.
     pub non_finite: u32,
     /// An index beyond the vertices.
     pub out_of_range: u32,
@@ -131,7 +134,8 @@ impl MeshTriangles {
         }
         let triangle = corners.map(|corner| Vec3::from_array(positions[corner]));
         let uv = corners.map(|corner| Vec2::from_array(uvs[corner]));
-        if !triangle.iter().all(|p| p.is_finite()) || !uv.iter().all(|p| p.is_finite()) {
+        let is_near = |corner: &Vec3| corner.abs().cmple(Vec3::splat(FARTHEST)).all();
+        if !triangle.iter().all(is_near) || !uv.iter().all(|p| p.is_finite()) {
             self.report.non_finite += 1;
             return;
         }
@@ -202,6 +206,18 @@ pub(crate) mod tests {
         let expected = TriangleReport { total: 5, degenerate: 2, non_finite: 1, out_of_range: 1 };
         assert_eq!(triangles.report, expected);
         assert_eq!(triangles.source, [0]);
+    }
+
+    #[test]
+    fn what_is_too_far_to_be_measured_is_left_out() {
+        for far in [2.0e9, 1.0e20, 3.0e38] {
+            let mut positions = QUAD.to_vec();
+            positions.extend([[far, 0.0, 0.0], [0.0, -far, 0.0], [0.0, 0.0, 1.0]]);
+            let indices = Indices::U32(vec![0, 1, 2, 4, 5, 6, 0, 5, 1]);
+            let mesh = mesh(PrimitiveTopology::TriangleList, &positions, Some(indices));
+            let triangles = MeshTriangles::from_mesh(&mesh).unwrap();
+            assert_eq!(triangles.report, TriangleReport { total: 3, non_finite: 2, ..default() });
+        }
     }
 
     #[test]

@@ -23,7 +23,7 @@ use crate::emitter::{EmissionSeed, Emitter};
 use crate::material::{PlayedWetMap, Playing};
 use crate::overlay::{FramesWork, OverlayUv, PrepareStamps, TexelArea, Unmapped, Weatherable};
 use crate::particle::{Forces, ParticleConfig};
-use crate::unwrap::NotUnwrapped;
+use crate::unwrap::{NotUnwrapped, UnwrapMeshes};
 use crate::wetting::{self, ExposureProgress, MeasureProgress, MeasureSurfaces};
 
 /// Spawns a scenario and runs it once everything is loaded. Virtual time stands still until then.
@@ -110,7 +110,10 @@ impl Plugin for ScenarioPlugin {
             )
             .add_systems(PreUpdate, follow_effect_files.before(RefreshEffects))
             // What they show is built in the same frame.
-            .add_systems(PreUpdate, fill_scenes.run_if(is_loading).before(BuildColliders))
+            .add_systems(
+                PreUpdate,
+                fill_scenes.run_if(is_loading).before(UnwrapMeshes).before(BuildColliders),
+            )
             .add_systems(Update, move_camera);
         apply_events_plugin(app);
 
