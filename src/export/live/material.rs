@@ -15,8 +15,8 @@ use crate::export::document::Document;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Looks {
     textures: LiveTextures,
-    /// Of `None`: what has no material.
-    numbers: BTreeMap<Option<AssetId<StandardMaterial>>, usize>,
+    /// Of `None`: what has no material. Whether its normal map is drawn makes two of one.
+    numbers: BTreeMap<(Option<AssetId<StandardMaterial>>, bool), usize>,
     materials: Vec<Look>,
     extensions: BTreeSet<&'static str>,
 }
@@ -28,7 +28,8 @@ struct Look {
 }
 
 impl Looks {
-    /// Takes a material in; its number.
+    /// Takes a material in; its number. `has_tangents`: of the mesh that shows it. Bevy draws no normal map without them, while
+    /// readers of a glTF make those that are missing.
     ///
     /// # Errors
     /// Why it cannot be written.
@@ -36,11 +37,8 @@ impl Looks {
         &mut self,
         world: &World,
         handle: Option<&Handle<StandardMaterial>>,
+        has_tangents: bool,
     ) -> Result<usize, String> {
-        let key = handle.map(Handle::id);
-        if let Some(&number) = self.numbers.get(&key) {
-            return Ok(number);
-        }
         let materials = world.get_resource::<Assets<StandardMaterial>>();
         let plain = StandardMaterial::default();
         let material = match handle {
@@ -49,7 +47,12 @@ impl Looks {
                 materials.and_then(|all| all.get(handle)).ok_or("has a material that is not loaded")?
             }
         };
-        let look = self.look(world.get_resource::<Assets<Image>>(), material)?;
+        let has_normal_map = has_tangents && material.normal_map_texture.is_some();
+        let key = (handle.map(Handle::id), has_normal_map);
+        if let Some(&number) = self.numbers.get(&key) {
+            return Ok(number);
+        }
+        let look = self.look(world.get_resource::<Assets<Image>>(), material, has_normal_map)?;
         self.materials.push(look);
         let number = self.materials.len() - 1;
         self.numbers.insert(key, number);
@@ -73,7 +76,12 @@ impl Looks {
         Ok(())
     }
 
-    fn look(&mut self, images: Option<&Assets<Image>>, of: &StandardMaterial) -> Result<Look, String> {
+    fn look(
+        &mut self,
+        images: Option<&Assets<Image>>,
+        of: &StandardMaterial,
+        has_normal_map: bool,
+    ) -> Result<Look, String> {
         let transform = self.transform(&of.uv_transform)?;
         let normals = if of.flip_normal_map_y { Meaning::FlippedNormals } else { Meaning::Data };
         let mut uv_sets = 0;
@@ -103,7 +111,11 @@ impl Looks {
             Meaning::Data,
             "roughness",
         )?;
-        let normal = texture(&of.normal_map_texture, &of.normal_map_channel, normals, "normal")?;
+        let normal = if has_normal_map {
+            texture(&of.normal_map_texture, &of.normal_map_channel, normals, "normal")?
+        } else {
+            Value::Null
+        };
         let occlusion = texture(&of.occlusion_texture, &of.occlusion_channel, Meaning::Data, "occlusion")?;
         let glows = of.emissive.red.max(of.emissive.green).max(of.emissive.blue) > 0.0;
         let emissive = if glows {
@@ -223,7 +235,7 @@ mod tests {
 
     fn look(material: StandardMaterial) -> Result<(Value, BTreeSet<&'static str>), String> {
         let mut looks = Looks::default();
-        let Look { json, .. } = looks.look(None, &material)?;
+        let Look { json, .. } = looks.look(None, &material, true)?;
         Ok((json, looks.extensions))
     }
 
@@ -289,7 +301,7 @@ mod tests {
             Affine2::from_scale_angle_translation(Vec2::new(2.0, 3.0), FRAC_PI_2, Vec2::new(0.25, 0.5));
         let material = StandardMaterial { base_color_texture: Some(image), uv_transform, ..default() };
         let mut looks = Looks::default();
-        let look = looks.look(Some(&images), &material).unwrap();
+        let look = looks.look(Some(&images), &material, true).unwrap();
         assert_eq!(look.uv_sets, 1);
         let mut document = Document { path: "scene".into(), json: json!({}), bytes: Vec::new() };
         looks.materials.push(look);
@@ -298,6 +310,30 @@ mod tests {
         let texture = document.source(Some(0), &mut Pictures::default()).unwrap().color_map.unwrap();
         let found = texture.texture_from_uv;
         assert!(found.abs_diff_eq(uv_transform, 1e-5), "{found:?} {uv_transform:?}");
+    }
+
+    #[test]
+    fn a_normal_map_that_is_not_drawn_is_left_out() {
+        let mut world = World::new();
+        let mut images = Assets::<Image>::default();
+        let size = Extent3d { width: 1, height: 1, depth_or_array_layers: 1 };
+        let (usage, format) = (RenderAssetUsages::default(), TextureFormat::Rgba8Unorm);
+        let image =
+            images.add(Image::new(size, TextureDimension::D2, vec![90, 128, 250, 255], format, usage));
+        let mut materials = Assets::<StandardMaterial>::default();
+        let bumpy = materials.add(StandardMaterial { normal_map_texture: Some(image), ..default() });
+        let smooth = materials.add(StandardMaterial::default());
+        world.insert_resource(images);
+        world.insert_resource(materials);
+        let mut looks = Looks::default();
+        let mut add =
+            |of: &Handle<StandardMaterial>, tangents: bool| looks.add(&world, Some(of), tangents).unwrap();
+        // Meshes with tangents and without may show the same material.
+        assert_eq!([add(&bumpy, true), add(&bumpy, false), add(&bumpy, true)], [0, 1, 0]);
+        assert_eq!([add(&smooth, true), add(&smooth, false)], [2, 2]);
+        let normals = |number: usize| looks.materials[number].json["normalTexture"].is_object();
+        assert_eq!([0, 1, 2].map(normals), [true, false, false]);
+        assert_eq!([looks.uv_sets(0), looks.uv_sets(1)], [1, 0]);
     }
 
     #[test]

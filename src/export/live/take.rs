@@ -94,7 +94,7 @@ impl Snapshot {
             };
             // One that has just been given is the newer.
             let dry = standard.map(|standard| &standard.0).or_else(|| dry.map(|dry| &dry.0));
-            let material = looks.add(world, dry).map_err(look_error)?;
+            let material = looks.add(world, dry, has_tangents(world, mesh)).map_err(look_error)?;
             let uv_sets = looks.uv_sets(material).max(set + 1);
             // Vertex colours of a flood are how high it stands.
             let paint = standing.is_some_and(|standing| standing.flood != Flood::None);
@@ -158,6 +158,12 @@ fn is_simulated(world: &World) -> bool {
 
 fn texels(size: Option<&MapSize>) -> u64 {
     size.map_or(0, |size| u64::from(size.texels()).pow(2))
+}
+
+/// Whether what a surface shows has tangents. In a pose it has too, though none are written.
+fn has_tangents(world: &World, handle: &Mesh3d) -> bool {
+    let mesh = world.get_resource::<Assets<Mesh>>().and_then(|meshes| meshes.get(&handle.0));
+    mesh.is_some_and(|mesh| mesh.try_contains_attribute(Mesh::ATTRIBUTE_TANGENT).unwrap_or(false))
 }
 
 /// Colour maps that came from the GPU; without them, nothing has been painted.
