@@ -63,7 +63,10 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
     if cfg!(target_os = "linux") && std::env::var_os("DISPLAY").is_none() {
         return Err("no display: DISPLAY is not set; use `weathering replay`, or start one (Xvfb)".into());
     }
-    let scenario = ScenarioPlugin::new(loaded.clone(), true)?;
+    // What takes seconds is made while the window is there already.
+    let is_slow = open::is_slow(&loaded);
+    let first = if is_slow { open::without_content(&loaded) } else { loaded.clone() };
+    let scenario = ScenarioPlugin::new(first.clone(), true)?;
     // Seen when there is something to be seen in it.
     let window =
         Window { title: "weathering".into(), resolution: (1280, 720).into(), visible: false, ..default() };
@@ -87,8 +90,7 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
     .add_plugins(scenario);
     model::light_shade(app.world_mut(), model::is_model(&arguments.file));
     let effects = app.world().resource::<EffectTable>().rows().len();
-    let exit = app
-        .insert_resource(open::Opened { loaded, effects })
+    app.insert_resource(open::Opened { loaded: first, effects })
         .insert_resource(shots::OutFolder(arguments.out.clone()))
         .insert_resource(begun)
         .add_plugins((ui::plugin, settings::plugin, selection::plugin, camera::plugin))
@@ -105,8 +107,11 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
             record::plugin,
         ))
         .add_systems(PreUpdate, spare_software_renderers)
-        .add_systems(Update, tell_of_reloads)
-        .run();
+        .add_systems(Update, tell_of_reloads);
+    if is_slow {
+        open::begin(app.world_mut(), loaded);
+    }
+    let exit = app.run();
     if exit.is_error() { Err("the scene could not be shown; see above".into()) } else { Ok(()) }
 }
 

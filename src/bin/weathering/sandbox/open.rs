@@ -9,7 +9,7 @@ use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use bevy::window::FileDragAndDrop;
 use bevy_weathering::effect::EffectTable;
 use bevy_weathering::scenario::{
-    LoadedScenario, PreparedScenario, Scenario, ScenarioStatus, switch_scenario,
+    LoadedScenario, PreparedScenario, Scenario, ScenarioStatus, TextureSpec, switch_scenario,
 };
 
 use super::ui::Note;
@@ -26,13 +26,54 @@ pub struct Opened {
 
 /// What is being opened.
 #[derive(Resource, Default)]
-pub struct Opening(Option<(PathBuf, Task<Result<PreparedScenario, String>>)>);
+pub struct Opening(Option<Coming>);
+
+/// A scene that is being read.
+struct Coming {
+    file: PathBuf,
+    task: Task<Result<PreparedScenario, String>>,
+    /// Nothing was there before it.
+    is_first: bool,
+}
 
 impl Opening {
     /// The file that is being read.
     pub fn file(&self) -> Option<&Path> {
-        self.0.as_ref().map(|(file, _)| file.as_path())
+        self.0.as_ref().map(|coming| coming.file.as_path())
     }
+
+    /// Whether that is what the program was started with.
+    pub fn is_first(&self) -> bool {
+        self.0.as_ref().is_some_and(|coming| coming.is_first)
+    }
+}
+
+/// Whether it takes seconds until all of a scene is there: stones are grown, light is gathered from pictures.
+pub fn is_slow(loaded: &LoadedScenario) -> bool {
+    let scenario = &loaded.scenario;
+    scenario.environment.is_some()
+        || scenario.materials.values().any(|material| material.texture != TextureSpec::default())
+}
+
+/// The same scene with nothing in it.
+pub fn without_content(loaded: &LoadedScenario) -> LoadedScenario {
+    let mut empty = loaded.clone();
+    let scenario = &mut empty.scenario;
+    scenario.surfaces.clear();
+    scenario.scenes.clear();
+    scenario.materials.clear();
+    scenario.emitters.clear();
+    scenario.events.clear();
+    scenario.environment = None;
+    empty
+}
+
+/// Begins to make all of the first scene, in place of an empty one.
+pub fn begin(world: &mut World, loaded: LoadedScenario) {
+    let file = loaded.file.clone();
+    let task = AsyncComputeTaskPool::get()
+        .spawn(async move { PreparedScenario::new(loaded, true).map_err(|error| error.to_string()) });
+    world.resource_mut::<Opening>().0 = Some(Coming { file, task, is_first: true });
 }
 
 pub fn plugin(app: &mut App) {
@@ -59,15 +100,16 @@ pub fn open(world: &mut World, file: &Path) {
         let loaded = load(&path, None)?;
         PreparedScenario::new(loaded, true).map_err(|error| error.to_string())
     });
-    world.resource_mut::<Opening>().0 = Some((file.to_owned(), task));
+    world.resource_mut::<Opening>().0 = Some(Coming { file: file.to_owned(), task, is_first: false });
 }
 
 /// Shows what has been read.
 fn finish(world: &mut World) {
-    let Some((file, mut task)) = world.resource_mut::<Opening>().0.take() else { return };
-    match check_ready(&mut task) {
-        None => world.resource_mut::<Opening>().0 = Some((file, task)),
+    let Some(mut coming) = world.resource_mut::<Opening>().0.take() else { return };
+    match check_ready(&mut coming.task) {
+        None => world.resource_mut::<Opening>().0 = Some(coming),
         Some(Ok(prepared)) => {
+            let file = coming.file;
             let (loaded, is_model) = (prepared.scenario().clone(), model::is_model(&file));
             record::finish(world);
             saving::give_up(world);
@@ -78,6 +120,10 @@ fn finish(world: &mut World) {
             let effects = world.resource::<EffectTable>().rows().len();
             world.insert_resource(Opened { loaded, effects });
             world.resource_mut::<Note>().tell(format!("opened {}", file.display()));
+        }
+        Some(Err(error)) if coming.is_first => {
+            error!("{error}");
+            world.write_message(AppExit::error());
         }
         Some(Err(error)) => world.resource_mut::<Note>().complain(error),
     }
@@ -119,6 +165,21 @@ fn tell_failure(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn scenes_of_stone_come_after_the_window_and_others_with_it() {
+        let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/scenarios");
+        let hose = load(&scenarios.join("hose.ron"), None).unwrap();
+        assert!(is_slow(&hose));
+        let empty = without_content(&hose);
+        assert!(!is_slow(&empty) && empty.scenario.surface_count() == 0);
+        assert_eq!(
+            (&empty.file, empty.scenario.camera.keys.len()),
+            (&hose.file, hose.scenario.camera.keys.len())
+        );
+        let model = load(&scenarios.join("../models/bunny_1000.glb"), None).unwrap();
+        assert!(!is_slow(&model));
+    }
 
     #[test]
     fn what_cannot_be_opened_is_named() {

@@ -9,7 +9,7 @@ use bevy_weathering::overlay::SplatStats;
 use bevy_weathering::overload::LiveLoad;
 use bevy_weathering::scenario::ScenarioStatus;
 
-use super::open::Opened;
+use super::open::{Opened, Opening};
 
 /// Seconds between two looks at the load: a title that flickers cannot be read.
 const PATIENCE: f32 = 0.5;
@@ -72,6 +72,7 @@ impl HeldBack {
 
 fn name_window(
     opened: Res<Opened>,
+    opening: Res<Opening>,
     status: Res<ScenarioStatus>,
     time: Res<Time<Virtual>>,
     real: Res<Time<Real>>,
@@ -82,6 +83,7 @@ fn name_window(
     mut looked_at: Local<f32>,
 ) {
     let state = match *status {
+        ScenarioStatus::Ready if opening.is_first() => "opening",
         ScenarioStatus::Ready if time.is_paused() => "paused",
         ScenarioStatus::Ready => "running",
         ScenarioStatus::Failed(_) => "failed",

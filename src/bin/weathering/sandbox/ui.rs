@@ -3,6 +3,7 @@
 //! A panel is a function that is given the world; its file registers it ([`AddPanel`]). The panels have a camera of their own
 //! that draws over the scene's, so that scenes come and go without them, and pictures can be taken without them.
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use bevy::camera::visibility::RenderLayers;
@@ -13,6 +14,7 @@ use bevy_egui::{
     EguiContext, EguiGlobalSettings, EguiPlugin, EguiPrimaryContextPass, PrimaryEguiContext, egui,
 };
 
+use super::open::Opening;
 use super::settings::Settings;
 use super::{keys, split, theme};
 
@@ -184,6 +186,9 @@ fn draw(world: &mut World, mut is_dressed: Local<bool>) {
     let free = root.available_rect_before_wrap();
     split::show_divider(&context, free, world);
     show_note(&context, free, world.resource::<Note>());
+    if let Some(file) = world.resource::<Opening>().file() {
+        show_opening(&context, free, file);
+    }
     let mut help = world.resource::<Help>().0;
     if help {
         keys::show_help(&context, &mut help);
@@ -250,6 +255,20 @@ fn layout_buttons(ui: &mut egui::Ui, world: &mut World) {
     }
     let mut help = world.resource_mut::<Help>();
     ui.toggle_value(&mut help.0, "?").on_hover_text("All keys (? or F1)");
+}
+
+/// That a scene is on its way, in the middle of the one before.
+fn show_opening(context: &egui::Context, free: egui::Rect, file: &Path) {
+    let area = egui::Area::new("opening".into()).interactable(false).order(egui::Order::Foreground);
+    let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
+    area.fixed_pos(free.center()).pivot(egui::Align2::CENTER_CENTER).show(context, |ui| {
+        egui::Frame::popup(ui.style()).show(ui, |ui| {
+            ui.horizontal(|ui| {
+                ui.spinner();
+                ui.label(format!("opening {name}"));
+            });
+        });
+    });
 }
 
 /// What was done last, below in the scene.
