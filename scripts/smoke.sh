@@ -33,7 +33,11 @@ trap finish EXIT
 
 fail() {
     echo "smoke: $*" >&2
-    [ ! -e "${scratch}/log" ] || tail -n 40 "${scratch}/log" >&2
+    if [ -e "${scratch}/log" ]; then
+        tail -n 40 "${scratch}/log" >&2
+        # What comes after a panic may be long.
+        grep -A 5 panicked "${scratch}/log" >&2 || true
+    fi
     exit 1
 }
 

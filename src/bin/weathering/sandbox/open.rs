@@ -1,11 +1,12 @@
 //! Opening scenes while the program runs: by the list, by a path, or dropped on the window.
 //!
-//! A scene is read on another thread while the old one goes on; when all is there, it takes the old one's place.
+//! A scene is read on a thread of its own while the old one goes on; when all is there, it takes the old one's place. Not on those of
+//! Bevy's pools: pipelines are compiled there, and there may be one only.
 
 use std::path::{Path, PathBuf};
+use std::thread::{JoinHandle, spawn};
 
 use bevy::prelude::*;
-use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use bevy::window::FileDragAndDrop;
 use bevy_weathering::effect::EffectTable;
 use bevy_weathering::scenario::{
@@ -31,7 +32,7 @@ pub struct Opening(Option<Coming>);
 /// A scene that is being read.
 struct Coming {
     file: PathBuf,
-    task: Task<Result<PreparedScenario, String>>,
+    thread: JoinHandle<Result<PreparedScenario, String>>,
     /// Nothing was there before it.
     is_first: bool,
 }
@@ -71,9 +72,8 @@ pub fn without_content(loaded: &LoadedScenario) -> LoadedScenario {
 /// Begins to make all of the first scene, in place of an empty one.
 pub fn begin(world: &mut World, loaded: LoadedScenario) {
     let file = loaded.file.clone();
-    let task = AsyncComputeTaskPool::get()
-        .spawn(async move { PreparedScenario::new(loaded, true).map_err(|error| error.to_string()) });
-    world.resource_mut::<Opening>().0 = Some(Coming { file, task, is_first: true });
+    let thread = spawn(move || PreparedScenario::new(loaded, true).map_err(|error| error.to_string()));
+    world.resource_mut::<Opening>().0 = Some(Coming { file, thread, is_first: true });
 }
 
 pub fn plugin(app: &mut App) {
@@ -96,20 +96,24 @@ pub fn load(file: &Path, variant: Option<&str>) -> Result<LoadedScenario, String
 /// Begins to open a file. One that is being opened already is given up.
 pub fn open(world: &mut World, file: &Path) {
     let path = file.to_owned();
-    let task = AsyncComputeTaskPool::get().spawn(async move {
+    let thread = spawn(move || {
         let loaded = load(&path, None)?;
         PreparedScenario::new(loaded, true).map_err(|error| error.to_string())
     });
-    world.resource_mut::<Opening>().0 = Some(Coming { file: file.to_owned(), task, is_first: false });
+    world.resource_mut::<Opening>().0 = Some(Coming { file: file.to_owned(), thread, is_first: false });
 }
 
 /// Shows what has been read.
 fn finish(world: &mut World) {
-    let Some(mut coming) = world.resource_mut::<Opening>().0.take() else { return };
-    match check_ready(&mut coming.task) {
-        None => world.resource_mut::<Opening>().0 = Some(coming),
-        Some(Ok(prepared)) => {
-            let file = coming.file;
+    let Some(coming) = world.resource_mut::<Opening>().0.take() else { return };
+    if !coming.thread.is_finished() {
+        world.resource_mut::<Opening>().0 = Some(coming);
+        return;
+    }
+    let Coming { file, thread, is_first } = coming;
+    let crashed = |_| Err(format!("{} could not be made", file.display()));
+    match thread.join().unwrap_or_else(crashed) {
+        Ok(prepared) => {
             let (loaded, is_model) = (prepared.scenario().clone(), model::is_model(&file));
             record::finish(world);
             saving::give_up(world);
@@ -121,11 +125,11 @@ fn finish(world: &mut World) {
             world.insert_resource(Opened { loaded, effects });
             world.resource_mut::<Note>().tell(format!("opened {}", file.display()));
         }
-        Some(Err(error)) if coming.is_first => {
+        Err(error) if is_first => {
             error!("{error}");
             world.write_message(AppExit::error());
         }
-        Some(Err(error)) => world.resource_mut::<Note>().complain(error),
+        Err(error) => world.resource_mut::<Note>().complain(error),
     }
 }
 

@@ -295,8 +295,15 @@ fn surfaces(world: &mut World) -> Vec<Overlays> {
 /// Asks for the three colour maps of each surface.
 fn ask(world: &mut World) -> Vec<[Option<Vec<u8>>; 3]> {
     let surfaces = surfaces(world);
-    for (index, Overlays { size, diffuse, specular, normal, .. }) in surfaces.iter().enumerate() {
+    let mut maps = vec![[const { None }; 3]; surfaces.len()];
+    for (index, Overlays { size, diffuse, specular, normal, has_colors, .. }) in surfaces.iter().enumerate() {
         let size = *size;
+        if !has_colors {
+            // Nothing has been painted, and there are no maps of that size to be read.
+            maps[index] =
+                [const { None }; 3].map(|_: Option<Vec<u8>>| Some(vec![0; size.pow(2) as usize * 4]));
+            continue;
+        }
         for (map, image) in [diffuse, specular, normal].into_iter().enumerate() {
             world.spawn(Readback::texture(image.clone())).observe(
                 move |data: On<ReadbackComplete>, mut saving: ResMut<Saving>, mut commands: Commands| {
@@ -311,7 +318,7 @@ fn ask(world: &mut World) -> Vec<[Option<Vec<u8>>; 3]> {
             );
         }
     }
-    vec![[const { None }; 3]; surfaces.len()]
+    maps
 }
 
 fn advance(world: &mut World) {
