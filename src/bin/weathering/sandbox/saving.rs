@@ -7,14 +7,13 @@
 use std::path::{Path, PathBuf};
 
 use bevy::prelude::*;
-use bevy::render::gpu_readback::{Readback, ReadbackComplete};
 use bevy::tasks::{AsyncComputeTaskPool, Task, block_on, futures::check_ready};
 use bevy_egui::egui;
 use bevy_weathering::clock::ShownTime;
-use bevy_weathering::overlay::{Overlays, SplatQueue, SplatStats};
+use bevy_weathering::export::{ColorReadback, SurfaceColors};
+use bevy_weathering::overlay::Overlays;
 use bevy_weathering::particle::Particles;
 use bevy_weathering::record::{self, Recording};
-use bevy_weathering::replay::without_padding;
 use bevy_weathering::save::{ColorMaps, SaveError, SavedScene};
 use bevy_weathering::scenario::{LoadedScenario, ScenarioStatus, ScenarioSurface, reset_scenario};
 
@@ -49,13 +48,25 @@ pub struct Saving(Option<Step>);
 
 enum Step {
     /// So many frames until the maps are read.
-    Settling { purpose: Purpose, frames: u32 },
-    /// Maps by surface, in the order of the scenario.
-    Reading { purpose: Purpose, maps: Vec<[Option<Vec<u8>>; 3]> },
+    Settling {
+        purpose: Purpose,
+        frames: u32,
+    },
+    Reading {
+        purpose: Purpose,
+        colors: ColorReadback,
+    },
     /// So many frames until surfaces that were reset have their new, empty maps.
-    Clearing { folder: PathBuf, scene: Box<SavedScene>, frames: u32 },
+    Clearing {
+        folder: PathBuf,
+        scene: Box<SavedScene>,
+        frames: u32,
+    },
     /// On another thread.
-    Writing { folder: PathBuf, task: Task<Result<(), SaveError>> },
+    Writing {
+        folder: PathBuf,
+        task: Task<Result<(), SaveError>>,
+    },
 }
 
 pub fn plugin(app: &mut App) {
@@ -283,62 +294,37 @@ fn restore(world: &mut World, folder: &Path, scene: &SavedScene) {
     }
 }
 
-/// Surfaces with maps, in the order of the scenario.
-fn surfaces(world: &mut World) -> Vec<Overlays> {
-    let mut query = world.query::<(&ScenarioSurface, &Overlays)>();
-    let mut all: Vec<(u32, Overlays)> =
-        query.iter(world).map(|(surface, overlays)| (surface.index, overlays.clone())).collect();
+/// The colour maps of all surfaces that have maps, in the order of the scenario; empty ones where nothing has been painted.
+fn in_order(world: &mut World, SurfaceColors(read): SurfaceColors) -> Vec<ColorMaps> {
+    let mut query = world.query::<(Entity, &ScenarioSurface, &Overlays)>();
+    let mut all: Vec<(u32, ColorMaps)> = query
+        .iter(world)
+        .map(|(entity, surface, overlays)| {
+            let found = read.iter().find(|(other, _)| *other == entity).map(|(_, colors)| colors.clone());
+            let empty = || vec![0; overlays.size.pow(2) as usize * 4];
+            let none = || ColorMaps { diffuse: empty(), specular: empty(), normal: empty() };
+            (surface.index, found.unwrap_or_else(none))
+        })
+        .collect();
     all.sort_by_key(|(index, _)| *index);
-    all.into_iter().map(|(_, overlays)| overlays).collect()
-}
-
-/// Asks for the three colour maps of each surface.
-fn ask(world: &mut World) -> Vec<[Option<Vec<u8>>; 3]> {
-    let surfaces = surfaces(world);
-    let mut maps = vec![[const { None }; 3]; surfaces.len()];
-    for (index, Overlays { size, diffuse, specular, normal, has_colors, .. }) in surfaces.iter().enumerate() {
-        let size = *size;
-        if !has_colors {
-            // Nothing has been painted, and there are no maps of that size to be read.
-            maps[index] =
-                [const { None }; 3].map(|_: Option<Vec<u8>>| Some(vec![0; size.pow(2) as usize * 4]));
-            continue;
-        }
-        for (map, image) in [diffuse, specular, normal].into_iter().enumerate() {
-            world.spawn(Readback::texture(image.clone())).observe(
-                move |data: On<ReadbackComplete>, mut saving: ResMut<Saving>, mut commands: Commands| {
-                    // It would be read again every frame.
-                    commands.entity(data.entity).try_despawn();
-                    if let Some(Step::Reading { maps, .. }) = &mut saving.0
-                        && let Some(map) = maps.get_mut(index).map(|maps| &mut maps[map])
-                    {
-                        map.get_or_insert_with(|| without_padding(&data.data, size));
-                    }
-                },
-            );
-        }
-    }
-    maps
+    all.into_iter().map(|(_, colors)| colors).collect()
 }
 
 fn advance(world: &mut World) {
     let Some(step) = world.resource_mut::<Saving>().0.take() else { return };
     let next = match step {
         Step::Settling { purpose, frames: 0 } => {
-            let maps = ask(world);
-            Some(Step::Reading { purpose, maps })
+            Some(Step::Reading { purpose, colors: ColorReadback::begin(world) })
         }
         Step::Settling { purpose, frames } => {
-            let mut queues = world.query::<&SplatQueue>();
-            // On their way, or beyond the budgets of the frames so far.
-            let waits = queues.iter(world).any(|queue| !queue.is_empty())
-                || world.resource::<SplatStats>().pending() > 0;
-            Some(Step::Settling { purpose, frames: if waits { SETTLE } else { frames - 1 } })
+            let frames = if ColorReadback::is_painted(world) { frames - 1 } else { SETTLE };
+            Some(Step::Settling { purpose, frames })
         }
-        Step::Reading { purpose, maps } if maps.iter().flatten().all(Option::is_some) => {
-            take(world, purpose, maps)
+        Step::Reading { purpose, colors } if colors.is_done() => {
+            let colors = in_order(world, colors.finish());
+            take(world, purpose, colors)
         }
-        Step::Reading { purpose, maps } => Some(Step::Reading { purpose, maps }),
+        Step::Reading { purpose, colors } => Some(Step::Reading { purpose, colors }),
         Step::Clearing { folder, scene, frames: 0 } => {
             restore(world, &folder, &scene);
             None
@@ -366,13 +352,7 @@ fn advance(world: &mut World) {
 }
 
 /// Takes the state, and keeps it or has it written.
-fn take(world: &mut World, purpose: Purpose, maps: Vec<[Option<Vec<u8>>; 3]>) -> Option<Step> {
-    let colors = maps.into_iter().map(|[diffuse, specular, normal]| ColorMaps {
-        diffuse: diffuse.unwrap_or_default(),
-        specular: specular.unwrap_or_default(),
-        normal: normal.unwrap_or_default(),
-    });
-    let colors = colors.collect();
+fn take(world: &mut World, purpose: Purpose, colors: Vec<ColorMaps>) -> Option<Step> {
     let folder = match purpose {
         Purpose::Folder(folder) => folder,
         Purpose::Moment { goes_on } => {
