@@ -21,11 +21,11 @@ if [ "${WEATHERING_WHOLE_DEBUG:-}" = 1 ]; then
 else
     # The profile of what it depends on stays, so nothing of that is built again.
     package=profile.release.package.bevy_weathering
-    cargo build --release --bin weathering --config "${package}.opt-level=0" \
+    build_program --config "${package}.opt-level=0" \
         --config "${package}.debug-assertions=true" --config "${package}.overflow-checks=true"
     cp "${CARGO_TARGET_DIR}/release/weathering" "${scratch}/plain"
 fi
-cargo build --release --bin weathering
+build_program
 cp "${CARGO_TARGET_DIR}/release/weathering" "${scratch}/optimised"
 
 # digest PROGRAM SCENARIO THREADS. Exit code 1: something is not as the scenario expects it, which need not hold so early.

@@ -3,7 +3,7 @@
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
-cargo build --release --bin weathering
+build_program
 folder="$(mktemp -d)"
 trap 'rm -rf "${folder}"' EXIT
 mkdir -p docs/pictures

@@ -6,7 +6,7 @@ invoked_from="${PWD}"
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
 [ -z "${DISPLAY:-}" ] || window_libraries
-cargo build --release --bin weathering
+build_program
 weathering="${CARGO_TARGET_DIR}/release/weathering"
 if [ "$#" -gt 0 ]; then
     cd "${invoked_from}"

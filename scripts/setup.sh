@@ -57,3 +57,9 @@ window_libraries() {
         fi
     done
 }
+
+# build_program [OPTION...]: builds `weathering`, and an example with it. What tests and examples depend on switches on features of
+# what Bevy depends on; a build without them would be another Bevy than the one of the tests, and take its time once more.
+build_program() {
+    cargo build --release --bin weathering --example minimal "$@"
+}

@@ -14,7 +14,7 @@ scene="${2:-assets/scenarios/hose.ron}"
 limit="${WEATHERING_START_SECONDS:-5}"
 weathering="${WEATHERING_PROGRAM:-}"
 if [ -z "${weathering}" ]; then
-    cargo build --release --bin weathering
+    build_program
     weathering="${CARGO_TARGET_DIR}/release/weathering"
 fi
 scratch="$(mktemp -d)"

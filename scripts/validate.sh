@@ -42,7 +42,7 @@ fi
 
 if [ $# -eq 0 ]; then
     source scripts/setup.sh
-    cargo build --release --bin weathering
+    build_program
     "${CARGO_TARGET_DIR}/release/weathering" bake assets/models/bunny_1000.glb --rain 20 --minutes 1 --size 128 \
         --out "${temporary}/bunny" >/dev/null
     WEATHERING_EXPORTS="${temporary}/exports" cargo test --release --test main -- export::
