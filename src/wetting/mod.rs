@@ -51,7 +51,7 @@ mod soak;
 pub mod spread;
 mod surface;
 #[cfg(test)]
-mod test_meshes;
+pub(crate) mod test_meshes;
 mod texel;
 mod tick;
 mod timing;
