@@ -18,7 +18,7 @@ use bevy::render::{ExtractSchedule, MainWorld, Render, RenderApp, RenderSystems}
 use bytemuck::{Pod, Zeroable};
 use half::f16;
 
-use super::surface::{Tiles, texel_in};
+use super::tiles::{Tiles, texel_in};
 use super::{Exposure, Marks, SurfaceWater, WetGeometry};
 use crate::matter::{GpuTexelMatter, SurfaceMatter, pack_matter};
 use crate::overlay::{MapSize, Overlays, TILE_SIZE};
