@@ -33,11 +33,13 @@ impl<'a> Now<'a> {
     }
 
     /// Constants of a texel.
+    #[inline]
     pub(crate) fn scale(&self, units: Units, texel: u32) -> Scale {
         Scale { unit_mm: self.geometry.unit_mm(units, texel), reserve_mm: self.material.reserve_mm() }
     }
 
     /// What a texel holds now, as depths.
+    #[inline]
     pub(crate) fn amounts(&self, scale: &Scale, texel: u32, water: &TexelWater) -> Amounts {
         let before = scale.amounts(water);
         if water.tick >= self.tick {
@@ -50,6 +52,7 @@ impl<'a> Now<'a> {
     }
 
     /// How what it holds looks now.
+    #[inline]
     pub(crate) fn look(&self, amounts: &Amounts, water: &TexelWater) -> WaterLook {
         let seconds = f64::from(self.tick.saturating_sub(water.tick)) / f64::from(self.hz);
         let shown = [water.shown, water.filmed].map(|byte| f64::from(byte) / 255.0);

@@ -43,6 +43,7 @@ impl Tiles {
         Self::set(&mut self.spreading, &mut self.flags[tile as usize], Self::SPREADING, tile);
     }
 
+    #[inline]
     pub(crate) fn touch(&mut self, tile: u32) {
         self.flags[tile as usize] |= Self::WET;
         Self::set(&mut self.dirty, &mut self.flags[tile as usize], Self::DIRTY, tile);
@@ -71,6 +72,7 @@ impl Tiles {
 }
 
 /// The tile of a column and row of texels.
+#[inline]
 pub(crate) fn tile_at(size: u32, x: u32, y: u32) -> u32 {
     (y / TILE_SIZE) * (size / TILE_SIZE) + x / TILE_SIZE
 }
