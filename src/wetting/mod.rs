@@ -36,6 +36,7 @@ mod islands;
 mod links;
 pub mod look;
 mod marks;
+mod measure;
 mod now;
 mod origin;
 mod ownership;
