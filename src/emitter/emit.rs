@@ -12,7 +12,8 @@ use crate::effect::drops::SIZE_CLASSES;
 use crate::effect::{DropSizes, EffectIndex, EffectTable};
 use crate::particle::{Lifespan, Particle, ParticleConfig, ParticleCounts, Particles, Sequence, WaterCounts};
 
-/// Particles that [`spawn_particles`] will spawn; a buffer that keeps its capacity. Between ticks, drips wait in it.
+/// Particles that are spawned at the end of a tick's emission; a buffer that keeps its capacity. Between ticks, drips wait
+/// in it.
 #[derive(Resource, Debug, Default)]
 pub struct NewParticles {
     particles: Vec<Particle>,
@@ -66,7 +67,7 @@ impl NewParticles {
 
 /// An emitter's turn in a tick.
 #[derive(Debug, Clone, Copy)]
-pub struct Turn {
+pub(super) struct Turn {
     emitter: Entity,
     number: u32,
     /// Emitters with the same number that came before.
@@ -80,7 +81,7 @@ pub struct Turn {
 
 /// Lets every enabled emitter, in the order of their streams, write the particles it owes, or, where there is not room for all,
 /// its part of them.
-pub fn emit_particles(
+pub(super) fn emit_particles(
     clock: Res<WeatheringClock>,
     seed: Res<EmissionSeed>,
     config: Res<ParticleConfig>,
@@ -179,7 +180,7 @@ pub fn emit_particles(
 }
 
 /// Spawns what [`emit_particles`] wrote, in one batch.
-pub fn spawn_particles(
+pub(super) fn spawn_particles(
     mut new: ResMut<NewParticles>,
     mut particles: ResMut<Particles>,
     mut counts: ResMut<ParticleCounts>,

@@ -25,7 +25,8 @@ use crate::effect::WeatherEffect;
 use crate::schedule::{WeatheringSystems, WeatheringTick};
 
 pub use detail::EmissionDetail;
-pub use emit::{NewParticles, emit_particles, spawn_particles};
+pub use emit::NewParticles;
+use emit::{emit_particles, spawn_particles};
 pub use silent::NotEmitting;
 pub use sources::{Source, TrackSources};
 pub use state::EmitterState;

@@ -84,7 +84,7 @@ pub const CRUST_PART: f64 = 0.25;
 pub const SNOW_SCATTERING_PER_MM: f64 = 0.135;
 
 /// A texel as it is drawn.
-pub fn pack_matter(
+pub(crate) fn pack_matter(
     matter: &SurfaceMatter,
     units: Units,
     geometry: &TexelGeometry,
