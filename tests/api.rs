@@ -13,18 +13,6 @@ use bevy_weathering::wetting::Refusal;
 
 use crate::wetting::scene::Scene;
 
-/// Frames without ticks, until there is an answer.
-fn update_until<T>(scene: &mut Scene, what: &str, mut ask: impl FnMut(&World) -> Option<T>) -> T {
-    for _ in 0..20_000 {
-        if let Some(answer) = ask(scene.0.world()) {
-            return answer;
-        }
-        scene.0.update();
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
-    panic!("never came: {what}");
-}
-
 fn update_for(scene: &mut Scene, frames: u32) {
     for _ in 0..frames {
         scene.0.update();
@@ -39,8 +27,7 @@ fn load(scene: &Scene, path: &'static str) -> Handle<WeatherEffect> {
 /// Loads an effect that is there.
 fn loaded(scene: &mut Scene, path: &'static str) -> Handle<WeatherEffect> {
     let handle = load(scene, path);
-    let is_there = |world: &World| world.resource::<Assets<WeatherEffect>>().contains(&handle).then_some(());
-    update_until(scene, path, is_there);
+    scene.wait_until(path, |world| world.resource::<Assets<WeatherEffect>>().contains(&handle));
     handle
 }
 
@@ -86,12 +73,12 @@ fn an_emitter_whose_effect_cannot_be_had_is_marked_until_it_has_another() {
         let effect = load(&scene, path);
         let id = effect.id();
         let emitter = scene.0.world_mut().spawn(Emitter { effect, ..default() }).id();
-        let marked = |world: &World| world.get::<NotEmitting>(emitter).cloned();
-        assert_eq!(update_until(&mut scene, path, marked), NotEmitting(id));
+        scene.wait_for::<NotEmitting>(emitter);
+        assert_eq!(scene.0.world().get::<NotEmitting>(emitter), Some(&NotEmitting(id)), "{path}");
 
         let mud = loaded(&mut scene, WeatherEffect::MUD);
         scene.0.world_mut().get_mut::<Emitter>(emitter).unwrap().effect = mud;
-        update_until(&mut scene, "no mark", |world| marked(world).is_none().then_some(()));
+        scene.wait_until("no mark", |world| world.get::<NotEmitting>(emitter).is_none());
         scene.run(1);
         scene.run(60);
         assert!(scene.0.world().get::<EmitterState>(emitter).unwrap().emitted > 0, "{path}");
@@ -139,9 +126,9 @@ fn surfaces_tell_once_that_they_are_ready_or_refused() {
         .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
         .with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, vec![[0.0, 0.0], [1.0, 0.0]]);
     let line = spawn(&mut scene, line);
-    update_until(&mut scene, "messages", |world| {
+    scene.wait_until("messages", |world| {
         let told = world.resource::<Told>();
-        (!told.ready.is_empty() && !told.refused.is_empty()).then_some(())
+        !told.ready.is_empty() && !told.refused.is_empty()
     });
     // It turns, and is measured again.
     scene.0.world_mut().get_mut::<Transform>(floor).unwrap().rotate_x(0.7);
@@ -162,9 +149,7 @@ fn surfaces_tell_once_that_they_are_ready_or_refused() {
     scene.0.world_mut().entity_mut(floor).remove::<Weatherable>();
     scene.0.update();
     scene.0.world_mut().entity_mut(floor).insert(Weatherable { map_size: 64, ..default() });
-    update_until(&mut scene, "the second time", |world| {
-        (world.resource::<Told>().ready == [floor, floor]).then_some(())
-    });
+    scene.wait_until("the second time", |world| world.resource::<Told>().ready == [floor, floor]);
 }
 
 #[test]
@@ -172,10 +157,10 @@ fn a_surface_without_room_for_its_maps_is_refused() {
     let mut scene = listening();
     scene.0.world_mut().resource_mut::<MapBudget>().bytes = 1;
     let floor = spawn(&mut scene, plane());
-    let refused =
-        update_until(&mut scene, "a refusal", |world| world.resource::<Told>().refused.first().copied());
-    assert_eq!(refused, SurfaceRefused { surface: floor, reason: Refusal::NoRoom });
-    assert!(scene.0.world().resource::<Told>().ready.is_empty());
+    scene.wait_until("a refusal", |world| !world.resource::<Told>().refused.is_empty());
+    let told = scene.0.world().resource::<Told>();
+    assert_eq!(told.refused[0], SurfaceRefused { surface: floor, reason: Refusal::NoRoom });
+    assert!(told.ready.is_empty());
 }
 
 /// Markdown's definitions of links: label and target.

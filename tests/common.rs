@@ -1,9 +1,20 @@
-//! What several modules need: random numbers, the same everywhere, and meshes without an asset server.
+//! What several modules need: random numbers, the same everywhere, meshes without an asset server, apps that run scenarios.
 
 use std::path::Path;
+use std::time::Duration;
 
-use bevy::math::Vec3;
+use bevy::asset::AssetPlugin;
+use bevy::gltf::GltfPlugin;
+use bevy::image::{CompressedImageFormatSupport, CompressedImageFormats, ImagePlugin};
+use bevy::mesh::MeshPlugin;
+use bevy::prelude::*;
+use bevy::time::TimeUpdateStrategy;
+use bevy::world_serialization::WorldSerializationPlugin;
+use bevy_weathering::WeatheringPlugins;
 use bevy_weathering::collision::MeshTriangles;
+use bevy_weathering::overlay::{CpuOverlayPlugin, GpuOverlayPlugin};
+use bevy_weathering::record::RecordPlugin;
+use bevy_weathering::scenario::{LoadedScenario, ScenarioPlugin, ScenarioStatus, ScenarioSurface};
 use bevy_weathering::scenes::gltf_mesh::read_first_primitive;
 
 /// SplitMix64 (Steele, Lea, Flood 2014): the same numbers on every machine.
@@ -34,4 +45,44 @@ impl Random {
 pub fn bunny() -> MeshTriangles {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models/bunny_1000.glb");
     read_first_primitive(&file).expect("the model is in the repository")
+}
+
+/// An app without a renderer in which a scenario loads, and which can be recorded; no tick runs by itself.
+pub fn scenario_app(loaded: LoadedScenario) -> App {
+    let assets = AssetPlugin { file_path: loaded.tree.to_string_lossy().into_owned(), ..default() };
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, TransformPlugin, assets, WorldSerializationPlugin))
+        .add_plugins((ImagePlugin::default(), MeshPlugin, GltfPlugin::default()))
+        .insert_resource(CompressedImageFormatSupport(CompressedImageFormats::NONE))
+        .init_asset::<AnimationClip>()
+        .add_plugins(WeatheringPlugins.build().disable::<GpuOverlayPlugin>())
+        .add_plugins((CpuOverlayPlugin, ScenarioPlugin::new(loaded, false).unwrap(), RecordPlugin))
+        .insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
+    app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::from_secs(3600));
+    app.finish();
+    app.cleanup();
+    app
+}
+
+/// Until the scene is there.
+pub fn wait_until_ready(app: &mut App) {
+    for _ in 0..10_000 {
+        app.update();
+        match app.world().resource::<ScenarioStatus>() {
+            ScenarioStatus::Ready => {
+                // Who records sees in the next frame that it is live.
+                app.update();
+                return;
+            }
+            ScenarioStatus::Loading => std::thread::sleep(Duration::from_millis(1)),
+            ScenarioStatus::Failed(error) => panic!("{error}"),
+        }
+    }
+    panic!("never ready");
+}
+
+/// A surface of a scenario, by its name.
+pub fn scenario_surface(world: &mut World, name: &str) -> Entity {
+    let mut surfaces = world.query::<(Entity, &ScenarioSurface)>();
+    surfaces.iter(world).find(|(_, surface)| surface.name == name).unwrap().0
 }

@@ -46,17 +46,6 @@ fn spawn(scene: &mut Scene, mesh: Mesh3d, map_size: u32, at: Vec3) -> Entity {
     scene.0.world_mut().spawn((maps, mesh, transform, GlobalTransform::from(transform))).id()
 }
 
-fn update_until(scene: &mut Scene, what: &str, mut done: impl FnMut(&mut Scene) -> bool) {
-    for _ in 0..100_000 {
-        if done(scene) {
-            return;
-        }
-        scene.0.update();
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
-    panic!("never came: {what}");
-}
-
 /// Half a second of drizzle, and the time until it has landed. Films so thin do not run.
 fn drizzle(scene: &mut Scene, rate: f32, half_size: Vec2, at: Vec3) {
     let shape = EmitterShape::Sky { half_size };
@@ -99,7 +88,7 @@ fn field() -> (Scene, Vec<(Entity, f32)>) {
 }
 
 fn sizes(scene: &mut Scene, plates: &[(Entity, f32)]) -> Vec<u32> {
-    update_until(scene, "sizes", |scene| plates.iter().all(|&(plate, _)| has::<MapSize>(scene, plate)));
+    plates.iter().for_each(|&(plate, _)| scene.wait_for::<MapSize>(plate));
     plates.iter().map(|&(plate, _)| get::<MapSize>(scene, plate).texels()).collect()
 }
 
@@ -121,9 +110,7 @@ fn five_hundred_surfaces_share_a_budget_and_each_is_rained_on() {
     let finest = widths().filter(|(texels, _)| *texels > 64).map(|(_, width)| width).fold(1.0, f32::min);
     assert!(coarsest <= finest * 2.001, "{coarsest} {finest}");
 
-    update_until(&mut scene, "the texels", |scene| {
-        plates.iter().all(|&(plate, _)| has::<SurfaceWater>(scene, plate))
-    });
+    plates.iter().for_each(|&(plate, _)| scene.wait_for::<SurfaceWater>(plate));
     drizzle(&mut scene, 80_000.0, Vec2::new(12.5, 10.0), Vec3::ZERO);
     for (&(plate, _), side) in plates.iter().zip(sides) {
         let totals: SurfaceTotals = get(&scene, plate);
@@ -173,9 +160,8 @@ fn who_was_hit_longest_ago_makes_room_and_nothing_is_lost_in_silence() {
     scene.0.insert_resource(MapBudget { bytes: bytes * 5 / 2, texel: None });
     let mesh = add(&mut scene, 1.0);
     let [first, second] = [0.0, 2.0].map(|x| spawn(&mut scene, mesh.clone(), 64, Vec3::X * x));
-    update_until(&mut scene, "two surfaces", |scene| {
-        has::<SurfaceWater>(scene, first) && has::<SurfaceWater>(scene, second)
-    });
+    scene.wait_for::<SurfaceWater>(first);
+    scene.wait_for::<SurfaceWater>(second);
     drizzle(&mut scene, 600.0, Vec2::splat(0.3), Vec3::ZERO);
     drizzle(&mut scene, 600.0, Vec2::splat(0.3), Vec3::X * 2.0);
     assert_eq!((pool(&scene).mapped, pool(&scene).used), (2, 2 * bytes));
@@ -184,9 +170,9 @@ fn who_was_hit_longest_ago_makes_room_and_nothing_is_lost_in_silence() {
 
     let third = spawn(&mut scene, mesh, 64, Vec3::X * 4.0);
     let mut messages = Vec::new();
-    update_until(&mut scene, "a third surface", |scene| {
-        messages.extend(scene.0.world_mut().resource_mut::<Messages<SurfaceEvicted>>().drain());
-        has::<SurfaceWater>(scene, third)
+    scene.wait_until("a third surface", |world| {
+        messages.extend(world.resource_mut::<Messages<SurfaceEvicted>>().drain());
+        world.get::<SurfaceWater>(third).is_some()
     });
     let loss: MapLoss = get(&scene, first);
     assert_eq!(messages, [SurfaceEvicted { surface: first, lost: loss }]);
@@ -209,7 +195,7 @@ fn who_was_hit_longest_ago_makes_room_and_nothing_is_lost_in_silence() {
 
     // Room for it again: it goes on, and its accounts with it.
     scene.0.world_mut().entity_mut(second).despawn();
-    update_until(&mut scene, "its maps", |scene| has::<SurfaceWater>(scene, first));
+    scene.wait_for::<SurfaceWater>(first);
     assert!(!has::<Unmapped>(&scene, first));
     drizzle(&mut scene, 600.0, Vec2::splat(0.3), Vec3::ZERO);
     assert!(scene.water(first).ledger().received > 0);
@@ -224,7 +210,7 @@ fn where_there_is_no_room_at_all_a_surface_is_refused_until_there_is() {
     scene.0.insert_resource(MapBudget { bytes: 1, texel: None });
     let mesh = add(&mut scene, 1.0);
     let plate = spawn(&mut scene, mesh, 512, Vec3::ZERO);
-    update_until(&mut scene, "a refusal", |scene| has::<Unmapped>(scene, plate));
+    scene.wait_for::<Unmapped>(plate);
     assert_eq!(scene.0.world().get::<Unmapped>(plate), Some(&Unmapped::Refused));
     drizzle(&mut scene, 600.0, Vec2::splat(0.3), Vec3::ZERO);
     let now = pool(&scene);
@@ -232,7 +218,7 @@ fn where_there_is_no_room_at_all_a_surface_is_refused_until_there_is() {
     assert!(get::<MapLoss>(&scene, plate).is_lost());
     assert_balanced(&scene, plate);
     scene.0.insert_resource(MapBudget::default());
-    update_until(&mut scene, "its maps", |scene| has::<SurfaceWater>(scene, plate));
+    scene.wait_for::<SurfaceWater>(plate);
     assert_eq!(get::<MapSize>(&scene, plate).texels(), 512);
 }
 
@@ -241,11 +227,11 @@ fn a_surface_that_is_given_other_maps_keeps_its_accounts() {
     let mut scene = Scene::new(HZ);
     let mesh = add(&mut scene, 1.0);
     let plate = spawn(&mut scene, mesh, 64, Vec3::ZERO);
-    update_until(&mut scene, "its texels", |scene| has::<SurfaceWater>(scene, plate));
+    scene.wait_for::<SurfaceWater>(plate);
     drizzle(&mut scene, 600.0, Vec2::splat(0.3), Vec3::ZERO);
     scene.0.world_mut().get_mut::<Weatherable>(plate).unwrap().map_size = 128;
     scene.0.update();
-    update_until(&mut scene, "its new texels", |scene| has::<SurfaceWater>(scene, plate));
+    scene.wait_for::<SurfaceWater>(plate);
     assert_eq!((get::<MapSize>(&scene, plate).texels(), scene.water(plate).size()), (128, 128));
     assert!(get::<MapLoss>(&scene, plate).is_lost());
     assert_balanced(&scene, plate);

@@ -98,18 +98,6 @@ pub fn glazed() -> PorousMaterial {
     PorousMaterial { capacity_mm: 0.0, retained_mm: 0.05, ..default() }
 }
 
-/// Runs frames without ticks until something is there that is worked out in the background.
-pub fn wait_for(scene: &mut Scene, what: &str, is_there: impl Fn(&World) -> bool) {
-    for _ in 0..20_000 {
-        if is_there(scene.0.world()) {
-            return;
-        }
-        scene.0.update();
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    panic!("{what} never came");
-}
-
 /// Throws paint at a point of a surface, from half a metre away.
 fn shoot(scene: &mut Scene, surface: Entity, at: Vec3, along: Vec3) {
     let effect = WeatherEffect {
@@ -125,7 +113,7 @@ fn shoot(scene: &mut Scene, surface: Entity, at: Vec3, along: Vec3) {
     let emitter = scene.0.world_mut().spawn((emitter, place)).id();
     // It asks for its effect; then the frames are measured.
     scene.run(1);
-    wait_for(scene, "frames", |world| world.get::<SurfaceFrames>(surface).is_some());
+    scene.wait_for::<SurfaceFrames>(surface);
     scene.run(20);
     scene.0.world_mut().despawn(emitter);
     scene.run(20);
@@ -221,7 +209,7 @@ fn two_surfaces_of_one_mesh_have_maps_and_poses_of_their_own() {
     let world = scene.0.world_mut();
     let shared = (*world.get::<Weatherable>(first).unwrap(), world.get::<Mesh3d>(first).unwrap().clone());
     let second = world.spawn((shared, glazed(), Transform::default())).id();
-    wait_for(&mut scene, "texels", |world| world.get::<SurfaceWater>(second).is_some());
+    scene.wait_for::<SurfaceWater>(second);
     let poses = [hanging(Vec3::ZERO), straight(Vec3::Z * 2.0)];
     skin(&mut scene, first, poses[0]);
     skin(&mut scene, second, poses[1]);
@@ -242,7 +230,7 @@ fn wet_and_hanging(scene: &mut Scene) -> (Entity, [Entity; 2]) {
         let [x, y] = (uv * SIZE as f32).to_array().map(|part| part as usize);
         y * SIZE as usize + x
     };
-    wait_for(scene, "slopes", |world| {
+    scene.wait_until("slopes", |world| {
         let heights = world.get::<WetGeometry>(surface).unwrap().0.height();
         let fall = heights[texel(Vec2::new(0.1, 0.5))] - heights[texel(Vec2::new(0.95, 0.5))];
         (fall - 0.9).abs() < 0.02
@@ -281,7 +269,7 @@ fn at_fixed_ticks_new_slopes_come_to_the_same_however_long_they_take() {
         let mut scene = Scene::new(60);
         scene.0.insert_resource(MeasureTiming::AfterTicks(10));
         let surface = scene.surface(plank(), SIZE, glazed(), Transform::default());
-        wait_for(&mut scene, "exposure", |world| world.get::<Exposure>(surface).is_some());
+        scene.wait_for::<Exposure>(surface);
         skin(&mut scene, surface, hanging(Vec3::ZERO));
         scene.pour(surface, Vec2::new(0.9, 0.5), 6, 2_000_000);
         let mut changed = 0;

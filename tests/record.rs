@@ -4,30 +4,23 @@ mod emitters;
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
-use bevy::asset::AssetPlugin;
-use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
-use bevy_weathering::WeatheringPlugins;
 use bevy_weathering::brush::{Brush, BrushKind, BrushQueue, Stroke};
 use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::emitter::{EmissionDetail, Emitter};
 use bevy_weathering::material::PorousMaterial;
-use bevy_weathering::overlay::{CpuOverlayPlugin, GpuOverlayPlugin};
 use bevy_weathering::record::{
-    Beginning, RecordError, RecordPlugin, Recording, begin, colors_at_hand, go_to, keep_moment, prepare,
-    put_back, save, take_back_stroke,
+    Beginning, RecordError, Recording, begin, colors_at_hand, go_to, keep_moment, prepare, put_back, save,
+    take_back_stroke,
 };
-use bevy_weathering::scenario::{
-    Action, ByHand, CameraMove, LoadedScenario, Scenario, ScenarioPlugin, ScenarioStatus, ScenarioSurface,
-    scene_digest,
-};
+use bevy_weathering::scenario::{Action, ByHand, CameraMove, LoadedScenario, Scenario, scene_digest};
 use bevy_weathering::schedule::run_tick;
 use bevy_weathering::weather::Weather;
 use tempfile::TempDir;
 
+use super::common::{scenario_app, scenario_surface, wait_until_ready};
 use super::replay::{replay, run};
 
 /// A tap over one of two floors; its story of its own ends it after two seconds, and the air gets drier.
@@ -63,10 +56,9 @@ impl Session {
         fs::write(folder.path().join("scene.ron"), SCENE).unwrap();
         let loaded = Scenario::load(&folder.path().join("scene.ron")).unwrap();
         let base = prepare(&loaded, Beginning::default(), &folder.path().join("recorded")).unwrap();
-        let mut app = app(base.clone());
-        app.add_plugins(RecordPlugin);
+        let mut app = scenario_app(base.clone());
         begin(app.world_mut(), base);
-        wait(&mut app);
+        wait_until_ready(&mut app);
         Self { folder, app }
     }
 
@@ -117,9 +109,7 @@ impl Session {
     }
 
     fn floor(&mut self, name: &str) -> Entity {
-        let world = self.world();
-        let mut surfaces = world.query::<(Entity, &ScenarioSurface)>();
-        surfaces.iter(world).find(|(_, surface)| surface.name == name).unwrap().0
+        scenario_surface(self.world(), name)
     }
 
     fn paint(&mut self, kind: BrushKind, x: f32, strength: f32) {
@@ -167,35 +157,6 @@ impl Session {
     fn save(&mut self) -> PathBuf {
         save(self.world()).unwrap()
     }
-}
-
-fn app(loaded: LoadedScenario) -> App {
-    let mut app = App::new();
-    app.add_plugins((MinimalPlugins, TransformPlugin, AssetPlugin::default(), MeshPlugin))
-        .add_plugins(WeatheringPlugins.build().disable::<GpuOverlayPlugin>())
-        .add_plugins((CpuOverlayPlugin, ScenarioPlugin::new(loaded, false).unwrap()))
-        .insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
-    app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::from_secs(3600));
-    app
-}
-
-/// Until the scene is there.
-fn wait(app: &mut App) {
-    app.finish();
-    app.cleanup();
-    for _ in 0..10_000 {
-        app.update();
-        match app.world().resource::<ScenarioStatus>() {
-            ScenarioStatus::Ready => {
-                // What loads sees that it is live.
-                app.update();
-                return;
-            }
-            ScenarioStatus::Loading => std::thread::sleep(Duration::from_millis(1)),
-            ScenarioStatus::Failed(error) => panic!("{error}"),
-        }
-    }
-    panic!("never ready");
 }
 
 /// What the program makes of a recording.
@@ -370,7 +331,7 @@ fn a_place_that_cannot_be_written_is_an_error_and_the_recording_goes_on() {
 
 /// A scenario that nobody records, without a renderer, when it is there.
 pub fn ready(loaded: LoadedScenario) -> App {
-    let mut app = app(loaded);
-    wait(&mut app);
+    let mut app = scenario_app(loaded);
+    wait_until_ready(&mut app);
     app
 }

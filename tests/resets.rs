@@ -10,7 +10,7 @@ use bevy_weathering::scenes::meshes::ground;
 use bevy_weathering::weather::Weather;
 use bevy_weathering::wetting::{Exposure, MeasureTiming, WetGeometry};
 
-use crate::posed::{fall, glazed, hanging, plank, skin, wait_for};
+use crate::posed::{fall, glazed, hanging, plank, skin};
 use crate::wetting::scene::Scene;
 
 /// Texels along each side, as of planks.
@@ -21,7 +21,7 @@ fn scene_with(mesh: Mesh, size: u32) -> (Scene, Entity) {
     let mut scene = Scene::new(60);
     scene.0.insert_resource(MeasureTiming::AfterTicks(10));
     let surface = scene.surface(mesh, size, glazed(), Transform::default());
-    wait_for(&mut scene, "exposure", |world| world.get::<Exposure>(surface).is_some());
+    scene.wait_for::<Exposure>(surface);
     (scene, surface)
 }
 

@@ -2,31 +2,17 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
-use bevy::asset::AssetPlugin;
-use bevy::gltf::GltfPlugin;
-use bevy::image::{CompressedImageFormatSupport, CompressedImageFormats, ImagePlugin};
-use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
-use bevy::world_serialization::WorldSerializationPlugin;
-use bevy_weathering::WeatheringPlugins;
 use bevy_weathering::brush::{Brush, BrushKind, BrushQueue, Stroke};
 use bevy_weathering::material::PorousMaterial;
-use bevy_weathering::matter::SurfaceMatter;
-use bevy_weathering::overlay::{CpuOverlayPlugin, GpuOverlayPlugin};
-use bevy_weathering::record::{
-    Beginning, ExtraEmitter, RecordPlugin, Recording, begin, colors_at_hand, prepare, save,
-};
+use bevy_weathering::record::{Beginning, ExtraEmitter, Recording, begin, colors_at_hand, prepare, save};
 use bevy_weathering::save::SavedScene;
-use bevy_weathering::scenario::{
-    Digest, EmitterKey, EmitterSpec, LoadedScenario, Scenario, ScenarioPlugin, ScenarioStatus,
-    ScenarioSurface, amounts_digest,
-};
-use bevy_weathering::wetting::SurfaceWater;
+use bevy_weathering::scenario::{EmitterKey, EmitterSpec, LoadedScenario, Scenario, scene_digest};
 use serde_json::{Value, json};
 
+use super::common::{scenario_app, scenario_surface, wait_until_ready};
 use super::replay::{files_below, read_report, replay, run, surfaces};
 
 /// What the surfaces of [`write_yard`] are called in a scene of this name.
@@ -211,39 +197,6 @@ fn broken_files_are_refused_before_anything_is_written() {
     run(command.arg(&out)).assert_refused(&["scene.ron", "yard.bin"], &out);
 }
 
-/// An app without a renderer in which a scenario is there.
-fn app(loaded: LoadedScenario) -> App {
-    let assets = AssetPlugin { file_path: loaded.tree.to_string_lossy().into_owned(), ..default() };
-    let mut app = App::new();
-    app.add_plugins((MinimalPlugins, TransformPlugin, assets, WorldSerializationPlugin))
-        .add_plugins((ImagePlugin::default(), MeshPlugin, GltfPlugin::default()))
-        .insert_resource(CompressedImageFormatSupport(CompressedImageFormats::NONE))
-        .init_asset::<AnimationClip>()
-        .add_plugins(WeatheringPlugins.build().disable::<GpuOverlayPlugin>())
-        .add_plugins((CpuOverlayPlugin, ScenarioPlugin::new(loaded, false).unwrap(), RecordPlugin))
-        .insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
-    app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::from_secs(3600));
-    app.finish();
-    app.cleanup();
-    app
-}
-
-/// Until the scene is there.
-fn wait(app: &mut App) {
-    for _ in 0..10_000 {
-        app.update();
-        match app.world().resource::<ScenarioStatus>() {
-            ScenarioStatus::Ready => {
-                app.update();
-                return;
-            }
-            ScenarioStatus::Loading => std::thread::sleep(Duration::from_millis(1)),
-            ScenarioStatus::Failed(error) => panic!("{error}"),
-        }
-    }
-    panic!("never ready");
-}
-
 fn run_ticks(app: &mut App, ticks: u32) {
     app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
     for _ in 0..ticks {
@@ -252,26 +205,10 @@ fn run_ticks(app: &mut App, ticks: u32) {
     app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
 }
 
-fn surface(app: &mut App, name: &str) -> Entity {
-    let world = app.world_mut();
-    let mut surfaces = world.query::<(Entity, &ScenarioSurface)>();
-    surfaces.iter(world).find(|(_, surface)| surface.name == name).unwrap().0
-}
-
 fn paint(app: &mut App, name: &str, x: f32) {
-    let surface = Some(surface(app, name));
+    let surface = Some(scenario_surface(app.world_mut(), name));
     let brush = Brush { kind: BrushKind::Wet, point: Vec3::new(x, -0.1, 0.1), radius: 0.3, strength: 0.4 };
     app.world_mut().resource_mut::<BrushQueue>().0.push(Stroke { brush, surface });
-}
-
-fn digest(app: &mut App) -> String {
-    let world = app.world_mut();
-    let impacts = *world.resource::<Digest>();
-    let mut surfaces = world.query::<(&ScenarioSurface, &SurfaceWater, &SurfaceMatter)>();
-    let mut order: Vec<_> = surfaces.iter(world).collect();
-    order.sort_by_key(|(surface, ..)| surface.index);
-    assert!(order.iter().map(|(surface, ..)| surface.name.as_str()).eq(NAMES));
-    amounts_digest(&impacts, order.into_iter().map(|(_, water, matter)| (water, matter)))
 }
 
 /// A tap over the scene, as the hose in the hand of the sandbox.
@@ -303,16 +240,16 @@ fn a_model_by_itself_is_recorded_and_replays_to_the_same_digest() {
     let beginning = Beginning { emitters: vec![hose()], ..default() };
     let base = prepare(&loaded, beginning, &recorded).unwrap();
     assert!(recorded.join("yard.gltf").is_file() && recorded.join("yard.bin").is_file());
-    let mut app = app(base.clone());
+    let mut app = scenario_app(base.clone());
     begin(app.world_mut(), base);
-    wait(&mut app);
+    wait_until_ready(&mut app);
     run_ticks(&mut app, 30);
     paint(&mut app, "yard.right", 0.5);
     run_ticks(&mut app, 20);
-    let left = surface(&mut app, "yard.left");
+    let left = scenario_surface(app.world_mut(), "yard.left");
     app.world_mut().get_mut::<PorousMaterial>(left).unwrap().sorptivity = 0.4;
     run_ticks(&mut app, 40);
-    let (digest, file) = (digest(&mut app), save(app.world_mut()).unwrap());
+    let (digest, file) = (scene_digest(app.world_mut()), save(app.world_mut()).unwrap());
     assert_eq!(app.world().resource::<Recording>().flaws().count(), 0);
     assert!(file.starts_with(&recorded), "{}", file.display());
     // The folder that it came from is not needed.
@@ -330,19 +267,19 @@ fn a_model_by_itself_is_saved_and_gone_on_with() {
     let folder = tempfile::tempdir().unwrap();
     let loaded = LoadedScenario::of_model(&write_yard(folder.path())).unwrap();
     let kept = folder.path().join("kept");
-    let mut first = app(loaded.clone());
-    wait(&mut first);
+    let mut first = scenario_app(loaded.clone());
+    wait_until_ready(&mut first);
     paint(&mut first, "yard.left", -0.5);
     run_ticks(&mut first, 30);
     let colors = colors_at_hand(first.world_mut()).unwrap();
     SavedScene::capture(first.world_mut(), &loaded, colors).write(&kept).unwrap();
     run_ticks(&mut first, 30);
 
-    let mut second = app(loaded.clone());
-    wait(&mut second);
+    let mut second = scenario_app(loaded.clone());
+    wait_until_ready(&mut second);
     SavedScene::read(&kept).unwrap().restore(second.world_mut(), &loaded, &kept).unwrap();
     run_ticks(&mut second, 30);
-    assert_eq!(digest(&mut second), digest(&mut first));
+    assert_eq!(scene_digest(second.world_mut()), scene_digest(first.world_mut()));
     // Of another model it is not.
     let other = folder.path().join("other.gltf");
     fs::copy(folder.path().join("yard.gltf"), &other).unwrap();

@@ -49,9 +49,8 @@ fn muddy(stamps: StampSpace, kind: StampSource) -> CpuMaps {
     scene.0.world_mut().get_mut::<Weatherable>(surface).unwrap().stamps = stamps;
     // The effect is asked for in the first tick; then the frames are measured.
     scene.run(1);
-    while stamps == StampSpace::Surface && scene.0.world().get::<SurfaceFrames>(surface).is_none() {
-        scene.0.update();
-        std::thread::sleep(std::time::Duration::from_millis(1));
+    if stamps == StampSpace::Surface {
+        scene.wait_for::<SurfaceFrames>(surface);
     }
     scene.run(240);
     scene.0.world().get::<CpuMaps>(surface).unwrap().clone()

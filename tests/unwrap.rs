@@ -44,14 +44,8 @@ fn surface(mesh: &Mesh, uv: OverlayUv) -> (Scene, Entity, Handle<Mesh>) {
     let maps = Weatherable { map_size: SIZE, uv, ..default() };
     let matter = PorousMaterial { capacity_mm: 0.0, retained_mm: 1000.0, ..default() };
     let surface = world.spawn((maps, matter, Mesh3d(mesh.clone()), Transform::default())).id();
-    for _ in 0..100_000 {
-        if scene.0.world().get::<SurfaceWater>(surface).is_some() {
-            return (scene, surface, mesh);
-        }
-        scene.0.update();
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
-    panic!("never measured");
+    scene.wait_for::<SurfaceWater>(surface);
+    (scene, surface, mesh)
 }
 
 /// The mesh that a surface shows.

@@ -33,7 +33,8 @@ pub use bvh::{LocalHit, MeshBvh};
 pub use colliders::{ColliderReport, MeshColliders, NotWeatherable, SurfaceCollider};
 pub use deform::{Deformer, DeformingCollider, PosedMesh, Shape};
 pub use scene::{CollisionScene, SceneHit};
-pub use trace::{ReportImpacts, SurfaceImpact, trace_particles};
+use trace::trace_particles;
+pub use trace::{ReportImpacts, SurfaceImpact};
 pub use triangles::{MeshTriangles, TriangleError, TriangleReport};
 pub use uvs::{AwaitsUvs, UvSet};
 

@@ -22,7 +22,7 @@ pub struct ReportImpacts;
 pub struct SurfaceImpact(pub Impact);
 
 /// Casts the segment each particle moved in this tick; what hits ends there and becomes an [`Impact`].
-pub fn trace_particles(
+pub(super) fn trace_particles(
     clock: Res<WeatheringClock>,
     scene: Res<CollisionScene>,
     mut impacts: ResMut<Impacts>,

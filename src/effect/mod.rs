@@ -35,7 +35,7 @@ pub struct WeatherEffect {
     /// How large the drops or grains are that it stands for. Their speed is what air slows them down to, if `terminal_speed` is
     /// none.
     pub drops: DropSizes,
-    /// Speed at which drag balances gravity, in m/s; 0 switches drag (and wind) off. Not given: that of its drops
+    /// Speed at which drag balances gravity, m/s, 0..=1000; 0 switches drag (and wind) off. Not given: that of its drops
     /// ([`fall_speed`](drops::fall_speed)) or, of dust, of its grains ([`settling_speed`](drops::settling_speed)).
     pub terminal_speed: Option<f32>,
     /// How fast it is swayed to and fro in still air, m/s; 0..=10. Flakes flutter. Needs drag.
@@ -46,13 +46,13 @@ pub struct WeatherEffect {
     /// Whether its particles are pieces of one jet, as of a hose, and not drops: where they hit they push the film aside, and
     /// sweep along outwards and forwards what they lift ([`matter::jet`](crate::matter::jet)).
     pub jet: bool,
-    /// Multiplies gravity: 1 falls, 0 floats.
+    /// Multiplies gravity, -10..=10: 1 falls, 0 floats.
     pub gravity_scale: f32,
     /// Shapes of the mark on the surface. Of an effect made in code, stamps of a kind are made when it is first used.
     pub stamps: StampSource,
-    /// Radius of the mark of a particle with `volume_mm3` or more, in metres; with less it is smaller, by (V/V₀)^(5/12), as drops of
-    /// one speed spread. Not given: of a round patch as large as what its drops spread to ([`spread_mm`](drops::spread_mm)), all
-    /// of them together.
+    /// Radius of the mark of a particle with `volume_mm3` or more, metres, 1e-6..=100; with less it is smaller, by (V/V₀)^(5/12),
+    /// as drops of one speed spread. Not given: of a round patch as large as what its drops spread to
+    /// ([`spread_mm`](drops::spread_mm)), all of them together.
     pub stamp_radius: Option<f32>,
     /// Each stamp's radius is drawn evenly from `stamp_radius` times 1 ± this; 0..=0.9.
     pub stamp_radius_jitter: f32,
@@ -63,7 +63,7 @@ pub struct WeatherEffect {
     pub stamp_stretch: f32,
     /// Painted over the surface's colour; linear RGB, 0..=1.
     pub diffuse: Paint,
-    /// Painted over the surface's gloss: red = reflectance, green = smoothness (1 - perceptual roughness).
+    /// Painted over the surface's gloss, 0..=1: red = reflectance, green = smoothness (1 - perceptual roughness).
     pub specular: Paint,
     /// Dome that the stamp adds to the normal, -1..=1: the sine of the slope at its rim. Negative is a dent.
     pub bump: f32,
@@ -118,13 +118,13 @@ pub struct Paint {
 pub struct ParticleLook {
     /// Linear RGBA, 0..=1.
     pub color: [f32; 4],
-    /// Width of the streak in metres.
+    /// Width of the streak, metres, 0..=10.
     pub width: f32,
-    /// Length of the streak as seconds of flight (exposure time); 0 draws a point.
+    /// Length of the streak as seconds of flight (exposure time), 0..=10; 0 draws a point.
     pub exposure: f32,
     /// What it looks like.
     pub sprite: Sprite,
-    /// Height of the splash where it hits, when it is largest, metres; 0 for none.
+    /// Height of the splash where it hits, when it is largest, metres, 0..=10; 0 for none.
     pub splash: f32,
 }
 

@@ -2,89 +2,18 @@
 
 use bevy::prelude::*;
 use rand_pcg::Pcg32;
-use serde::{Deserialize, Serialize};
 
 use super::detail::Deal;
 use super::shape::unit;
 use super::sources::Births;
-use super::{EmissionDetail, EmissionSeed, Emitter, Source, TrackSources};
+use super::{EmissionDetail, EmissionSeed, Emitter, EmitterState, Source, TrackSources};
 use crate::clock::WeatheringClock;
 use crate::effect::drops::SIZE_CLASSES;
-use crate::effect::{DropSizes, EffectIndex, EffectTable, WeatherEffect};
+use crate::effect::{DropSizes, EffectIndex, EffectTable};
 use crate::particle::{Lifespan, Particle, ParticleConfig, ParticleCounts, Particles, Sequence, WaterCounts};
 
-/// What an [`Emitter`] has sent out and still owes.
-#[derive(Component, Serialize, Deserialize, Debug, Clone, Default, PartialEq)]
-pub struct EmitterState {
-    /// Particles owed, times the tick rate: stays exact in `f64` for any `f32` rate.
-    owed: f64,
-    /// Water owed below a whole nanolitre.
-    owed_nl: f64,
-    /// Of a flow: water, nanolitres, of particles that were not sent and that no other could take along yet.
-    #[serde(default)]
-    held_nl: f64,
-    rng: Option<Pcg32>,
-    /// Its number, where sources are tracked.
-    #[serde(skip)]
-    source: Source,
-    /// Particles sent out so far.
-    pub emitted: u64,
-}
-
-impl EmitterState {
-    /// Whether it owes less than a particle, and less than a nanolitre, at this tick rate: as after every tick.
-    pub(crate) fn is_sound(&self, hz: u32) -> bool {
-        // What is left may be rounded to just below 0. Written so that NaN fails.
-        (-1.0..=f64::from(hz)).contains(&self.owed) && (0.0..=1.0).contains(&self.owed_nl)
-    }
-
-    /// Adds one tick's worth of `rate` and takes out the whole particles. Also returns when within the tick the
-    /// first is born, and the time between two, both in ticks.
-    fn due(&mut self, rate: f32, hz: u32) -> (u32, f64, f64) {
-        let (rate, hz) = (f64::from(rate), f64::from(hz));
-        let before = self.owed;
-        self.owed += rate;
-        let count = (self.owed / hz).floor();
-        // Exact: both are multiples of the last bit of `rate`, far above that of an f64.
-        self.owed -= count * hz;
-        (count as u32, (hz - before) / rate, hz / rate)
-    }
-
-    /// What each of `count` particles of a flow stands for, nanolitres, if `due` of `each_nl` were to be sent: all their water,
-    /// and what was held before. At most what a particle may carry; the rest is held.
-    fn share_nl(&mut self, due: u32, count: u32, each_nl: f64) -> f64 {
-        if count == due && self.held_nl == 0.0 {
-            return each_nl;
-        }
-        self.held_nl += f64::from(due) * each_nl;
-        if count == 0 {
-            return 0.0;
-        }
-        let most = f64::from(WeatherEffect::MAX_VOLUME_MM3) * 1000.0;
-        let share = self.held_nl / f64::from(count);
-        if share <= most {
-            self.held_nl = 0.0;
-            return share;
-        }
-        self.held_nl -= most * f64::from(count);
-        most
-    }
-
-    /// Of a flow: water of particles that limits kept from being sent and that no other has taken along yet, mm³.
-    pub fn held_mm3(&self) -> f64 {
-        self.held_nl / 1000.0
-    }
-
-    /// Whole nanolitres of the next particle; what is cut off goes to the one after.
-    fn water_nl(&mut self, water_nl: f64) -> u32 {
-        self.owed_nl += water_nl;
-        let whole = self.owed_nl.floor();
-        self.owed_nl -= whole;
-        whole as u32
-    }
-}
-
-/// Particles that [`spawn_particles`] will spawn; a buffer that keeps its capacity. Between ticks, drips wait in it.
+/// Particles that are spawned at the end of a tick's emission; a buffer that keeps its capacity. Between ticks, drips wait
+/// in it.
 #[derive(Resource, Debug, Default)]
 pub struct NewParticles {
     particles: Vec<Particle>,
@@ -138,7 +67,7 @@ impl NewParticles {
 
 /// An emitter's turn in a tick.
 #[derive(Debug, Clone, Copy)]
-pub struct Turn {
+pub(super) struct Turn {
     emitter: Entity,
     number: u32,
     /// Emitters with the same number that came before.
@@ -152,7 +81,7 @@ pub struct Turn {
 
 /// Lets every enabled emitter, in the order of their streams, write the particles it owes, or, where there is not room for all,
 /// its part of them.
-pub fn emit_particles(
+pub(super) fn emit_particles(
     clock: Res<WeatheringClock>,
     seed: Res<EmissionSeed>,
     config: Res<ParticleConfig>,
@@ -251,7 +180,7 @@ pub fn emit_particles(
 }
 
 /// Spawns what [`emit_particles`] wrote, in one batch.
-pub fn spawn_particles(
+pub(super) fn spawn_particles(
     mut new: ResMut<NewParticles>,
     mut particles: ResMut<Particles>,
     mut counts: ResMut<ParticleCounts>,
@@ -265,6 +194,7 @@ pub fn spawn_particles(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effect::WeatherEffect;
     use crate::emitter::{EmitterShape, Flow};
 
     fn world(hz: u32, effect: WeatherEffect) -> World {

@@ -15,6 +15,7 @@ mod shape;
 mod silent;
 mod sky;
 mod sources;
+mod state;
 
 use bevy::prelude::*;
 use schemars::JsonSchema;
@@ -24,9 +25,11 @@ use crate::effect::WeatherEffect;
 use crate::schedule::{WeatheringSystems, WeatheringTick};
 
 pub use detail::EmissionDetail;
-pub use emit::{EmitterState, NewParticles, emit_particles, spawn_particles};
+pub use emit::NewParticles;
+use emit::{emit_particles, spawn_particles};
 pub use silent::NotEmitting;
 pub use sources::{Source, TrackSources};
+pub use state::EmitterState;
 
 /// Sends out particles of one effect. Configuration only; see [`EmitterState`] for what it has done.
 #[derive(Component, Reflect, Debug, Clone)]

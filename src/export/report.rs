@@ -23,7 +23,7 @@ pub struct ExportReport {
     pub wind: [f32; 3],
     /// Ticks run.
     pub ticks: u32,
-    /// The same as weather time.
+    /// The same as weather time, s.
     pub seconds: f64,
     /// All particles.
     pub particles: ParticleReport,

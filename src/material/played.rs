@@ -13,7 +13,7 @@ use bevy::prelude::*;
 pub struct PlayedWetMap {
     /// Linear; red counts.
     pub map: Handle<Image>,
-    /// From dry to wet or back, above 0.
+    /// Seconds from dry to wet or back, above 0.
     pub seconds: f32,
     /// Softness of the wet border, 0..=1 of the whole; 0 is a hard edge. .1 to .5 looks right.
     pub t_fill: f32,

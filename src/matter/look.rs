@@ -84,7 +84,7 @@ pub const CRUST_PART: f64 = 0.25;
 pub const SNOW_SCATTERING_PER_MM: f64 = 0.135;
 
 /// A texel as it is drawn.
-pub fn pack_matter(
+pub(crate) fn pack_matter(
     matter: &SurfaceMatter,
     units: Units,
     geometry: &TexelGeometry,
@@ -154,13 +154,10 @@ pub fn roughness_under(base: f64, matter: f64, cover: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use bevy::math::Affine3A;
-
     use super::super::test_world::{Ground, Place};
     use super::super::texel::MatterKind;
     use super::*;
-    use crate::collision::MeshTriangles;
-    use crate::overlay::Wrap;
+    use crate::wetting::test_meshes::corner_of_a_map;
 
     #[test]
     fn a_layer_of_grains_as_thick_as_one_covers_most_and_layers_multiply() {
@@ -227,16 +224,7 @@ mod tests {
 
     #[test]
     fn beside_an_island_nothing_lies() {
-        let corners = [Vec2::ZERO, Vec2::X, Vec2::Y];
-        let triangles = MeshTriangles {
-            positions: vec![corners.map(|at| Vec3::new(at.x, 0.0, at.y))],
-            uvs: vec![corners.map(|at| at * 0.5)],
-            source: vec![0],
-            ..default()
-        };
-        let wrap = [Wrap::Clamp; 2];
-        let geometry = TexelGeometry::new(&triangles, &Affine3A::IDENTITY, Vec3::Y, 16, wrap);
-        let units = Units { shift: 0 };
+        let (geometry, units) = (corner_of_a_map(), Units { shift: 0 });
         let pack = |texel| pack_matter(&SurfaceMatter::default(), units, &geometry, texel).snow >> 16;
         assert_eq!([pack(0), pack(16 + 2), pack(15), pack(16 * 12 + 12)], [1, 1, 0, 0]);
     }

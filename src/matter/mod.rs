@@ -31,7 +31,8 @@ use bevy::prelude::*;
 
 use crate::overlay::Weatherable;
 
-pub use look::{GpuTexelMatter, MatterLook, pack_matter};
+pub(crate) use look::pack_matter;
+pub use look::{GpuTexelMatter, MatterLook};
 pub use settle::Deposit;
 pub use slide::SnowFall;
 pub use surface::{MatterLedger, MatterStock, SurfaceMatter};

@@ -172,8 +172,8 @@ impl Plugin for CpuOverlayPlugin {
         app.add_observer(release_maps).add_systems(
             WeatheringTick,
             (
-                add_cpu_maps.before(super::deposit_splats),
-                paint_on_cpu.after(super::deposit_splats).after(add_cpu_maps),
+                add_cpu_maps.before(super::deposit::deposit_splats),
+                paint_on_cpu.after(super::deposit::deposit_splats).after(add_cpu_maps),
             )
                 .in_set(WeatheringSystems::Deposit),
         );

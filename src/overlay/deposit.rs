@@ -168,7 +168,7 @@ type Stamped = (
 );
 
 /// Turns this tick's impacts into splats, in their order. What falls on a surface without maps is entered as lost.
-pub fn deposit_splats(
+pub(super) fn deposit_splats(
     clock: Res<WeatheringClock>,
     impacts: Res<Impacts>,
     effects: Res<EffectTable>,

@@ -39,7 +39,7 @@ pub use atlas::StampAtlas;
 pub use budget::SplatBudget;
 pub use cpu::{CpuMaps, CpuOverlayPlugin};
 pub(crate) use deposit::measure_texels;
-pub use deposit::{DepositPlugin, PrepareStamps, SplatQueue, SurfaceTotals, SurfaceTraces, deposit_splats};
+pub use deposit::{DepositPlugin, PrepareStamps, SplatQueue, SurfaceTotals, SurfaceTraces};
 pub(crate) use frames::FramesWork;
 pub use frames::{SurfaceFrames, TexelFrame};
 pub use gpu::{GpuOverlayPlugin, MipStep, Overlays, SplatStats, SurfaceBatch};

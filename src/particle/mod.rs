@@ -30,12 +30,12 @@ use crate::weather::Weather;
 
 pub use draw::{
     GpuFrame, GpuLook, GpuParticle, ParticleDrawPlugin, ParticleMaterial, ParticleMesh, Splash, SplashConfig,
-    Splashes, add_splashes,
+    Splashes,
 };
 pub use integrate::integrate_particles;
 pub use pool::{Particle, Particles};
 pub(crate) use pool::{SavedParticle, chunk_len, for_each_chunk};
-pub use retire::retire_particles;
+use retire::retire_particles;
 pub(crate) use rows::{BoxRows, ROW};
 
 /// How long a particle has left, and when within its first tick it was born.

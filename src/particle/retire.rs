@@ -6,7 +6,7 @@ use super::{ParticleCounts, Particles, WaterCounts};
 use crate::effect::EffectTable;
 
 /// Takes out the particles that hit a surface or whose time ran out, and ends the first tick of the newly born.
-pub fn retire_particles(
+pub(super) fn retire_particles(
     mut particles: ResMut<Particles>,
     mut counts: ResMut<ParticleCounts>,
     mut water: ResMut<WaterCounts>,

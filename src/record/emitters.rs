@@ -10,7 +10,8 @@ use std::path::Path;
 use bevy::prelude::*;
 
 use super::file::write;
-use super::watch::{Watched, WatchedEmitter};
+use super::watch::Watched;
+use super::watched_emitter::WatchedEmitter;
 use super::{ExtraEmitter, Recording};
 use crate::effect::WeatherEffect;
 use crate::scenario::{Action, EmitterAdjustment, EmitterSpec, Scenario, spawn_emitter};

@@ -48,6 +48,7 @@ mod history;
 mod rewind;
 mod session;
 mod watch;
+mod watched_emitter;
 
 use bevy::prelude::*;
 

@@ -35,7 +35,7 @@ pub struct SurfaceMaps {
     pub wetness: Vec<Wetness>,
     /// Reference tick of each texel, row by row; empty while it has never been wet.
     pub since: Vec<u32>,
-    /// Part of its area that looks wet.
+    /// Part of its area that looks wet, 0..=1.
     pub wet_fraction: f64,
     /// All its water.
     pub water: SurfaceWater,

@@ -25,7 +25,7 @@ pub struct Report {
     pub seed: u64,
     /// Ticks run.
     pub ticks: u32,
-    /// The same as weather time.
+    /// The same as weather time, s.
     pub seconds: f64,
     /// All particles.
     pub particles: ParticleReport,
@@ -157,7 +157,7 @@ pub struct WorkReport {
     pub tiles_spread: u64,
 }
 
-/// Where the time went.
+/// Where the wall-clock time went.
 #[derive(Serialize, Debug, Clone, Copy, PartialEq)]
 pub struct Timing {
     /// Until the first tick.

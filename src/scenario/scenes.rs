@@ -193,11 +193,11 @@ mod tests {
     use tempfile::TempDir;
 
     use super::*;
+    use crate::scenes::gltf_mesh::test_file::write_with_triangle;
 
     /// A file with two meshes and an instance of one of them; `edit` makes it another one.
     fn write_model(folder: &Path, edit: impl FnOnce(&mut Value)) {
-        let mut json = json!({
-            "asset": { "version": "2.0" },
+        let json = json!({
             "scenes": [{ "nodes": [0, 1, 2] }],
             "nodes": [
                 { "name": "left", "mesh": 0, "translation": [-2.0, 0.0, 0.0] },
@@ -208,15 +208,8 @@ mod tests {
                 { "primitives": [{ "attributes": { "POSITION": 0 } }] },
                 { "primitives": [{ "attributes": { "POSITION": 0 } }, { "attributes": { "POSITION": 0 } }] },
             ],
-            "buffers": [{ "uri": "corners.bin", "byteLength": 36 }],
-            "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
-            "accessors": [{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
-                "min": [0.0, 0.0, 0.0], "max": [1.0, 1.0, 0.0] }],
         });
-        edit(&mut json);
-        let corners = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
-        std::fs::write(folder.join("corners.bin"), corners.map(f32::to_le_bytes).as_flattened()).unwrap();
-        std::fs::write(folder.join("model.gltf"), json.to_string()).unwrap();
+        write_with_triangle(&folder.join("model.gltf"), json, edit);
     }
 
     fn load_with(

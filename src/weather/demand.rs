@@ -2,17 +2,17 @@
 
 use serde::{Deserialize, Serialize};
 
-/// An amount of water that could evaporate, mm, or a rate of it.
+/// An amount of water that could evaporate, mm, or a rate of it, mm/h.
 #[derive(Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Default)]
 pub struct Demand {
-    /// By the air, from a free surface.
+    /// By the air, from a free surface; mm or mm/h.
     pub air_mm: f64,
-    /// By the sun, from a surface that faces it.
+    /// By the sun, from a surface that faces it; mm or mm/h.
     pub sun_mm: f64,
 }
 
 impl Demand {
-    /// Both, in proportion to what a place is exposed to.
+    /// Both, in proportion to what a place is exposed to: parts of the air and of the sun of a free surface, each 0..=1.
     pub fn at(self, air: f64, sun: f64) -> f64 {
         self.air_mm * air + self.sun_mm * sun
     }

@@ -24,17 +24,17 @@ pub use drying_clock::{DryingClock, DryingPoint, advance_drying_clock};
 #[derive(Resource, Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
 #[reflect(Resource)]
 pub struct Weather {
-    /// °C, -40..=60. Below 0 nothing evaporates here.
+    /// °C, -40..=60. At 0 and below nothing evaporates here.
     pub temperature_c: f32,
     /// Relative humidity, 0..=1.
     pub humidity: f32,
     /// Moves particles and carries vapour away, m/s.
     pub wind: Vec3,
-    /// Where the sun shines to. Need not be of length 1; zero is no sun.
+    /// Where the sun shines to, in world space. Need not be of length 1; zero is no sun.
     pub sun_direction: Vec3,
     /// Power of the sun on a surface that faces it, W/m², 0..=1400.
     pub sun_w_per_m2: f32,
-    /// How many times faster things dry than in the world, where it takes hours; 0 stops it.
+    /// How many times faster things dry and melt than in the world, where it takes hours, 0..=1,000,000; 0 stops it.
     pub drying_speed: f32,
 }
 

@@ -27,9 +27,9 @@ pub struct DropsOptions {
     pub drops: u32,
     /// Part of them that run, 0..=1.
     pub lines: f32,
-    /// Least and greatest radius, 0.75 to a quarter of the size; small ones are more frequent.
+    /// Least and greatest radius, texels, 0.75 to a quarter of the size; small ones are more frequent.
     pub radius: [f32; 2],
-    /// The longest line, up to the size.
+    /// The longest line, texels, up to the size.
     pub line_length: f32,
 }
 

@@ -6,8 +6,10 @@
 use super::drip::DripSite;
 use super::evolve::film_left;
 use super::geometry::{Link, Side};
-use super::surface::{Now, SurfaceWater, texel_in};
+use super::now::Now;
+use super::surface::SurfaceWater;
 use super::texel::Units;
+use super::tiles::texel_in;
 use crate::matter::{SurfaceMatter, wash};
 use crate::overlay::TILE_SIZE;
 use crate::weather::Demand;

@@ -2,26 +2,21 @@
 
 use std::sync::Arc;
 
-use bevy::math::{Affine3A, DVec2, Vec2, Vec3};
+use bevy::math::{Affine3A, Vec2, Vec3};
 
 use super::Units;
-use super::finder::Finder;
-use super::grid::Grid;
 use super::gutters::Gutters;
 use super::islands::Islands;
 use super::links::Links;
-use super::ownership::{NOBODY, Ownership};
-use super::points::front_normals;
+use super::ownership::NOBODY;
 use super::slopes::Slopes;
-use super::walk::Surface;
 use crate::collision::MeshTriangles;
-use crate::overlay::{TexelAreas, Wrap};
 
 pub use super::grid::Side;
 pub use super::links::Link;
 
 /// Marks a number among triangles. There are fewer triangles than this.
-const STAND_IN: u32 = 1 << 31;
+pub(super) const STAND_IN: u32 = 1 << 31;
 
 /// Where the texels of a map lie in the world, and who lies beside whom on the mesh.
 ///
@@ -35,104 +30,29 @@ const STAND_IN: u32 = 1 << 31;
 ///
 /// Methods that take a texel panic if the map has no such texel.
 pub struct TexelGeometry {
-    layout: Arc<TexelLayout>,
-    slopes: Slopes,
+    pub(super) layout: Arc<TexelLayout>,
+    pub(super) slopes: Slopes,
 }
 
 /// What does not change when the mesh takes another pose.
 pub(crate) struct TexelLayout {
-    size: u32,
-    area_mm2: Vec<f32>,
-    mean_mm2: f32,
+    pub(super) size: u32,
+    pub(super) area_mm2: Vec<f32>,
+    pub(super) mean_mm2: f32,
     /// By texel: its triangle, or [`STAND_IN`] and where in `stand_ins` to look, or [`NOBODY`].
-    owner: Vec<u32>,
+    pub(super) owner: Vec<u32>,
     /// The texel that stands in for one that nobody owns, and the island next to which that lies.
-    stand_ins: Vec<[u32; 2]>,
-    islands: Islands,
-    links: Links,
-    gutters: Gutters,
+    pub(super) stand_ins: Vec<[u32; 2]>,
+    pub(super) islands: Islands,
+    pub(super) links: Links,
+    pub(super) gutters: Gutters,
     /// A tile, and another with texels that show what the first one holds; ascending.
-    gutter_tiles: Vec<(u32, u32)>,
+    pub(super) gutter_tiles: Vec<(u32, u32)>,
     /// Length of a mean texel, metres, for those without a triangle.
-    mean_length: f32,
+    pub(super) mean_length: f32,
 }
 
 impl TexelGeometry {
-    /// Measures a mesh that stands in the world by `world_from_mesh`, for a map of `size` x `size` texels.
-    /// `up` is where water comes from, of any length above 0.
-    pub fn new(
-        triangles: &MeshTriangles,
-        world_from_mesh: &Affine3A,
-        up: Vec3,
-        size: u32,
-        wrap: [Wrap; 2],
-    ) -> Self {
-        let up = up.normalize_or(Vec3::Y);
-        let grid = Grid { size, wrap };
-        let areas = TexelAreas::new(triangles, world_from_mesh, size, wrap);
-        let surface = Surface::new(triangles, world_from_mesh, grid);
-        let owners = Ownership::new(triangles, grid);
-        let finder = Finder::new(grid, &surface, &owners);
-        let (links, mut gutters) = (Links::new(&finder), Gutters::new(&finder));
-        let stand_ins = gutters.take_stand_ins();
-        let islands = Islands::new(&finder, &stand_ins);
-        let above_origin =
-            |texel: u32| finder.place(texel).map(|place| surface.in_space(&place).dot(up.as_dvec3()) as f32);
-        let heights = (0..grid.texels() as u32).map(above_origin);
-        let normals = front_normals(triangles, world_from_mesh);
-        let mean_length = positive_or(areas.mean_mm2.sqrt() * 1e-3, 1e-3);
-        let lengths = (0..surface.map.len() as u32).map(|triangle| {
-            [DVec2::X, DVec2::Y].map(|step| {
-                let length = surface.step_in_space(triangle, step).map_or(0.0, |step| step.length() as f32);
-                positive_or(length, mean_length)
-            })
-        });
-        let facing = normals.iter().map(|normal| normal.dot(up));
-        let slopes = Slopes::new(heights, &owners.triangle, facing, lengths.collect());
-        let mut owner = owners.triangle;
-        for (number, stand_in) in (0u32..).zip(&stand_ins) {
-            owner[stand_in.texel as usize] = STAND_IN | number;
-        }
-        let stand_ins = stand_ins
-            .iter()
-            .map(|stand_in| [stand_in.other, islands.of(owner[stand_in.from as usize])])
-            .collect();
-        let layout = TexelLayout {
-            size,
-            area_mm2: areas.mm2,
-            mean_mm2: areas.mean_mm2,
-            gutter_tiles: gutters.tiles(size),
-            links,
-            gutters,
-            mean_length,
-            owner,
-            stand_ins,
-            islands,
-        };
-        Self { layout: Arc::new(layout), slopes }
-    }
-
-    /// The same surface in another pose: heights, slopes and distances are those of `corners`, the triangles of the same
-    /// mesh in world space, in the same order; `mirrored` if a mirror has brought them there. Areas, links and owners stay
-    /// what they are at rest.
-    pub fn posed(&self, uvs: &[[Vec2; 3]], corners: &[[Vec3; 3]], mirrored: bool, up: Vec3) -> Self {
-        let (layout, up) = (self.layout.clone(), up.normalize_or(Vec3::Y));
-        let front = if mirrored { -up } else { up };
-        // Far from the origin of the world, few digits would be left for a texel.
-        let origin = corners.first().map_or(Vec3::ZERO, |corners| corners[0]);
-        let heights = (0..layout.owner.len() as u32).map(|texel| {
-            let owner = self.owner(texel)? as usize;
-            let ([a, b, c], [to_b, to_c]) = (*corners.get(owner)?, self.weights(texel, uvs.get(owner)?));
-            Some(up.dot((a - origin) + (b - a) * to_b + (c - a) * to_c))
-        });
-        let facing = corners.iter().map(|[a, b, c]| (b - a).cross(c - a).normalize_or_zero().dot(front));
-        let lengths = corners.iter().zip(uvs).map(|(&corners, &uvs)| {
-            texel_lengths(corners, uvs, layout.size).map(|length| positive_or(length, layout.mean_length))
-        });
-        let slopes = Slopes::new(heights, &layout.owner, facing, lengths.collect());
-        Self { layout, slopes }
-    }
-
     /// What it has in common with the same surface in other poses.
     pub(crate) fn layout(&self) -> &Arc<TexelLayout> {
         &self.layout
@@ -143,7 +63,7 @@ impl TexelGeometry {
         self.layout.size
     }
 
-    /// World area that each texel stands for, mm²; the values of [`TexelAreas`]. 0 where nothing lies.
+    /// World area that each texel stands for, mm²; the values of [`TexelAreas`](crate::overlay::TexelAreas). 0 where nothing lies.
     pub fn area_mm2(&self) -> &[f32] {
         &self.layout.area_mm2
     }
@@ -325,24 +245,12 @@ impl TexelGeometry {
     }
 }
 
-/// Length of a texel along u and v on a triangle, metres; 0 or not a number if it has none.
-fn texel_lengths([a, b, c]: [Vec3; 3], [uv_a, uv_b, uv_c]: [Vec2; 3], size: u32) -> [f32; 2] {
-    let (uv_ab, uv_ac) = ((uv_b - uv_a) * size as f32, (uv_c - uv_a) * size as f32);
-    let area = uv_ab.perp_dot(uv_ac);
-    let length = |along_b: f32, along_c: f32| ((b - a) * along_b - (c - a) * along_c).length() / area.abs();
-    [length(uv_ac.y, uv_ab.y), length(uv_ac.x, uv_ab.x)]
-}
-
-/// A length if it is one, else `other`.
-fn positive_or(length: f32, other: f32) -> f32 {
-    if length.is_finite() && length > 0.0 { length } else { other }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::points::surface_points;
     use super::super::test_meshes::{Cube, cylinder, floor, joined, sheet};
     use super::*;
+    use crate::overlay::{TexelAreas, Wrap};
 
     const REPEAT: [Wrap; 2] = [Wrap::Repeat; 2];
     const SLOPE: f32 = std::f32::consts::FRAC_PI_6;

@@ -18,7 +18,7 @@ use bevy::render::{ExtractSchedule, MainWorld, Render, RenderApp, RenderSystems}
 use bytemuck::{Pod, Zeroable};
 use half::f16;
 
-use super::surface::{Tiles, texel_in};
+use super::tiles::{Tiles, texel_in};
 use super::{Exposure, Marks, SurfaceWater, WetGeometry};
 use crate::matter::{GpuTexelMatter, SurfaceMatter, pack_matter};
 use crate::overlay::{MapSize, Overlays, TILE_SIZE};
@@ -341,11 +341,8 @@ fn write_tiles(
 
 #[cfg(test)]
 mod tests {
-    use bevy::math::Affine3A;
-
-    use super::super::TexelGeometry;
+    use super::super::test_meshes::corner_of_a_map;
     use super::*;
-    use crate::collision::MeshTriangles;
     use crate::overlay::{Weatherable, Wrap};
 
     /// Tiles whose texels say which they are, and when they were packed.
@@ -391,15 +388,8 @@ mod tests {
 
     #[test]
     fn what_lies_beside_the_mesh_is_marked_and_holds_nothing() {
-        let corners = [Vec2::ZERO, Vec2::X, Vec2::Y];
-        let triangles = MeshTriangles {
-            positions: vec![corners.map(|at| Vec3::new(at.x, 0.0, at.y))],
-            uvs: vec![corners.map(|at| at * 0.5)],
-            source: vec![0],
-            ..default()
-        };
+        let geometry = corner_of_a_map();
         let surface = Weatherable { map_size: 16, wrap_u: Wrap::Clamp, wrap_v: Wrap::Clamp, ..default() };
-        let geometry = TexelGeometry::new(&triangles, &Affine3A::IDENTITY, Vec3::Y, 16, surface.wrap());
         let mut water = SurfaceWater::new(&surface, geometry.mean_mm2());
         water.cover(&geometry, 1.0, 0.0, 7);
         let pack = |texel| pack_texel(&water, &geometry, None, texel);

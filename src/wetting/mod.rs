@@ -36,6 +36,8 @@ mod islands;
 mod links;
 pub mod look;
 mod marks;
+mod measure;
+mod now;
 mod origin;
 mod ownership;
 mod points;
@@ -51,9 +53,10 @@ mod soak;
 pub mod spread;
 mod surface;
 #[cfg(test)]
-mod test_meshes;
+pub(crate) mod test_meshes;
 mod texel;
 mod tick;
+mod tiles;
 mod timing;
 mod walk;
 
@@ -82,12 +85,14 @@ pub(crate) use timing::MeasureTimer;
 pub use timing::MeasureTiming;
 
 pub(crate) use geometry::TexelLayout;
+pub(crate) use now::Now;
 #[cfg(test)]
 pub(crate) use run_off::{RunScratch, run_off};
 #[cfg(test)]
 pub(crate) use soak::{SoakScratch, soak};
 pub(crate) use soak::{note_arrival, texel_under};
-pub(crate) use surface::{Now, Tiles, jitter, texel_in};
+pub(crate) use surface::jitter;
+pub(crate) use tiles::{Tiles, texel_in};
 
 /// Drips of this tick, of one surface.
 #[derive(Component, Debug, Default)]

@@ -14,7 +14,7 @@ use bevy::math::{Affine3A, Vec3A};
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task};
 
-use super::surface::Tiles;
+use super::tiles::Tiles;
 use super::{MeasureTiming, SurfaceWater, TexelGeometry, TexelLayout, WetGeometry};
 use crate::clock::WeatheringClock;
 use crate::collision::{DeformingCollider, PosedMesh, SurfaceCollider};

@@ -1,7 +1,7 @@
 //! Taking a surface back to what it held before.
 
 use super::SurfaceWater;
-use super::surface::Tiles;
+use super::tiles::Tiles;
 use crate::matter::SurfaceMatter;
 
 impl SurfaceWater {

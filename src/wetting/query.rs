@@ -185,9 +185,9 @@ pub(crate) fn summary(water: &SurfaceWater, now: &Now) -> SurfaceWetness {
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component)]
 pub struct WatchWetness {
-    /// It has become wet when more than this part of it is.
+    /// It has become wet when more than this part of its area is, 0..=1.
     pub wet_above: f32,
-    /// It has dried when less than this part of it is wet; below `wet_above`.
+    /// It has dried when less than this part of its area is wet, 0..=1; below `wet_above`.
     pub dry_below: f32,
     /// Seconds of weather between two looks; each looks at all texels.
     pub every: f32,
@@ -206,7 +206,7 @@ impl Default for WatchWetness {
 pub struct BecameWet {
     /// The surface.
     pub surface: Entity,
-    /// Part of it that is wet.
+    /// Part of its area that is wet, 0..=1.
     pub wet_fraction: f32,
 }
 
@@ -215,7 +215,7 @@ pub struct BecameWet {
 pub struct Dried {
     /// The surface.
     pub surface: Entity,
-    /// Part of it that is still wet.
+    /// Part of its area that is still wet, 0..=1.
     pub wet_fraction: f32,
 }
 

@@ -5,7 +5,9 @@
 //! its pores dry. Measured once after each shower. The amounts stay as they are, so nothing is seen of it at that moment.
 
 use super::geometry::{Link, Side};
-use super::surface::{Now, SurfaceWater, Tiles};
+use super::now::Now;
+use super::surface::SurfaceWater;
+use super::tiles::Tiles;
 
 /// Steps from the rim to where a texel no longer knows of it.
 pub const REACH: u32 = 24;

@@ -20,7 +20,9 @@
 use super::drip::Drip;
 use super::flow::{Block, Films, LEAST_RETAINED, Move, Shed, TileStep, UnitDepth, look_at};
 use super::geometry::{Link, Side};
-use super::surface::{Now, SurfaceWater, Tiles};
+use super::now::Now;
+use super::surface::SurfaceWater;
+use super::tiles::Tiles;
 use crate::matter::SurfaceMatter;
 use crate::matter::wash::{Moved, carry_dust, wash_off};
 use crate::overlay::TILE_SIZE;

@@ -9,7 +9,9 @@
 
 use super::arrivals::{Arrivals, Parcel};
 use super::flow::LEAST_RETAINED;
-use super::surface::{Now, SurfaceWater, Tiles};
+use super::now::Now;
+use super::surface::SurfaceWater;
+use super::tiles::Tiles;
 use crate::emitter::Source;
 use crate::matter::SurfaceMatter;
 use crate::matter::jet::sweep;

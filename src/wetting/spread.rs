@@ -8,7 +8,9 @@
 //! Not here: matter below the uppermost layer, and gravity in the pores.
 
 use super::geometry::{Link, Side};
-use super::surface::{Now, SurfaceWater, Tiles, texel_in};
+use super::now::Now;
+use super::surface::SurfaceWater;
+use super::tiles::{Tiles, texel_in};
 use crate::overlay::TILE_SIZE;
 
 /// Steps a second.

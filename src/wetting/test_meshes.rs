@@ -1,10 +1,12 @@
-//! Meshes for the tests of this folder.
+//! Meshes for the tests of water, and of what lies beside it.
 
 use std::f32::consts::TAU;
 
-use bevy::math::{Vec2, Vec3};
+use bevy::math::{Affine3A, Vec2, Vec3};
 
+use super::TexelGeometry;
 use crate::collision::MeshTriangles;
+use crate::overlay::Wrap;
 
 /// The unit square, cut into `cells` x `cells` quads, put into space and on the map.
 pub(super) fn sheet(
@@ -42,6 +44,18 @@ pub(super) fn joined(parts: impl IntoIterator<Item = MeshTriangles>) -> MeshTria
 /// The unit square on the floor, facing up; v grows towards +z.
 pub(super) fn floor(point: Vec2) -> Vec3 {
     Vec3::new(point.x, 0.0, point.y)
+}
+
+/// Half of the first quarter of a map of 16 texels, on the floor; the rest of the map lies beside the mesh.
+pub(crate) fn corner_of_a_map() -> TexelGeometry {
+    let corners = [Vec2::ZERO, Vec2::X, Vec2::Y];
+    let triangle = MeshTriangles {
+        positions: vec![corners.map(floor)],
+        uvs: vec![corners.map(|at| at * 0.5)],
+        source: vec![0],
+        ..MeshTriangles::default()
+    };
+    TexelGeometry::new(&triangle, &Affine3A::IDENTITY, Vec3::Y, 16, [Wrap::Clamp; 2])
 }
 
 /// [`sheet`] is wound so that it faces down there; this turns a mesh round.

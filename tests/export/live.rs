@@ -11,7 +11,7 @@ use bevy_weathering::wetting::SurfaceWater;
 
 use super::bake::{mean, primitive, texels, wet_material};
 use super::rules::{Glb, count};
-use crate::posed::{glazed, hanging, plank, posed, skin, wait_for};
+use crate::posed::{glazed, hanging, plank, posed, skin};
 use crate::wetting::scene::Scene;
 
 /// Bricks, 8 by 8 texels.
@@ -98,7 +98,7 @@ fn what_an_app_shows_is_a_scene_with_its_water() {
     let tilted = Transform::from_rotation(Quat::from_rotation_z(0.6));
     let shelf =
         scene.0.world_mut().spawn((Name::new("shelf"), maps, porous(), mesh, tilted, ChildOf(parent))).id();
-    wait_for(&mut scene, "the shelf", |world| world.get::<SurfaceWater>(shelf).is_some());
+    scene.wait_for::<SurfaceWater>(shelf);
     // Uvs that tile: the app has given it others.
     let wall = surface(&mut scene, "wall", ground(3.0), look);
     scene.pour(floor, Vec2::splat(0.25), 12, 400_000_000);
@@ -187,7 +187,7 @@ fn what_cannot_be_exported_is_named() {
     let maps = Weatherable { map_size: 64, uv: OverlayUv::Mesh, ..default() };
     let tiled = (Name::new("tiled"), maps, porous(), Mesh3d(mesh), Transform::default());
     let tiled = scene.0.world_mut().spawn(tiled).id();
-    wait_for(&mut scene, "the tiles", |world| world.get::<SurfaceWater>(tiled).is_some());
+    scene.wait_for::<SurfaceWater>(tiled);
     named(take(&mut scene).and_then(|taken| taken.bake(None)), ["`tiled`", "repeat"]);
     named(take(&mut scene).and_then(|taken| taken.bake(Some(3))), ["`texture-size`", "3"]);
     scene.0.world_mut().entity_mut(tiled).insert(GlobalTransform::from_xyz(f32::NAN, 0.0, 0.0));

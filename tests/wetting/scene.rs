@@ -1,5 +1,7 @@
 //! A world with surfaces and without a renderer.
 
+use std::time::Duration;
+
 use bevy::asset::AssetPlugin;
 use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
@@ -28,7 +30,7 @@ impl Scene {
             .add_plugins(CpuOverlayPlugin)
             .insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
         app.world_mut().resource_mut::<Weather>().drying_speed = 0.0;
-        app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(std::time::Duration::from_secs(3600));
+        app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::from_secs(3600));
         app.finish();
         app.cleanup();
         Self(app)
@@ -49,14 +51,25 @@ impl Scene {
             .world_mut()
             .spawn((maps, material, Mesh3d(mesh), transform, GlobalTransform::from(transform)))
             .id();
+        self.wait_for::<SurfaceWater>(surface);
+        surface
+    }
+
+    /// Runs frames without ticks until an entity has something that is worked out in the background.
+    pub fn wait_for<C: Component>(&mut self, entity: Entity) {
+        self.wait_until(std::any::type_name::<C>(), |world| world.get::<C>(entity).is_some());
+    }
+
+    /// Runs frames without ticks until something is so.
+    pub fn wait_until(&mut self, what: &str, mut is_so: impl FnMut(&mut World) -> bool) {
         for _ in 0..100_000 {
-            if self.0.world().get::<SurfaceWater>(surface).is_some() {
-                return surface;
+            if is_so(self.0.world_mut()) {
+                return;
             }
             self.0.update();
-            std::thread::sleep(std::time::Duration::from_millis(1));
+            std::thread::sleep(Duration::from_millis(1));
         }
-        panic!("never measured");
+        panic!("never came: {what}");
     }
 
     pub fn emit(&mut self, emitter: Emitter, water_mm3: f32, stamp_radius: f32, at: Vec3) -> Entity {

@@ -14,6 +14,8 @@
 pub mod authored;
 pub mod film_on_pores;
 pub mod hnat;
+#[cfg(test)]
+mod hnat_checks;
 pub mod lagarde;
 pub mod lekner_dorf;
 pub mod twomey;

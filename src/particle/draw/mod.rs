@@ -43,7 +43,8 @@ use self::rows::{ParticleRows, splash_rows};
 
 pub use material::ParticleMaterial;
 pub use rows::{GpuFrame, GpuLook, GpuParticle};
-pub use splash::{Splash, SplashConfig, Splashes, add_splashes};
+use splash::add_splashes;
+pub use splash::{Splash, SplashConfig, Splashes};
 
 /// The entity whose mesh holds all particles.
 #[derive(Component, Debug, Default)]

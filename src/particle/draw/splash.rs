@@ -136,7 +136,7 @@ impl Splashes {
 }
 
 /// Adds the splashes of this tick's impacts, and takes out those whose time is over.
-pub fn add_splashes(
+pub(super) fn add_splashes(
     impacts: Res<Impacts>,
     effects: Res<EffectTable>,
     clock: Res<WeatheringClock>,

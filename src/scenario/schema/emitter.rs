@@ -14,7 +14,7 @@ pub struct EmitterSpec {
     pub name: String,
     /// `.effect.ron`.
     pub effect: String,
-    /// Particles per second.
+    /// Particles per second, 0..=10,000,000.
     pub rate: f32,
     /// Where on it they start.
     #[serde(default)]
@@ -22,13 +22,13 @@ pub struct EmitterSpec {
     /// How much it sends out.
     #[serde(default)]
     pub flow: Flow,
-    /// m/s. Not given: of a hose that of its flow, under a sky as fast as its drops fall.
+    /// m/s, 0..=1000. Not given: of a hose that of its flow, under a sky as fast as its drops fall.
     #[serde(default)]
     pub speed: Option<f32>,
-    /// Half-angle of the cone of directions.
+    /// Half-angle of the cone of directions, degrees, 0..=180.
     #[serde(default)]
     pub spread_deg: f32,
-    /// Seconds until a particle that hits nothing is removed.
+    /// Seconds until a particle that hits nothing is removed; above 0 to 3600, and at most 65,534 ticks.
     #[serde(default = "default_lifetime")]
     pub lifetime: f32,
     /// Seconds at which it starts.
@@ -62,10 +62,10 @@ pub struct EmitterKey {
     /// Seconds.
     #[serde(default)]
     pub t: f32,
-    /// Its position.
+    /// Its position, metres.
     #[schemars(with = "[f32; 3]")]
     pub position: Vec3,
-    /// What it aims at.
+    /// What it aims at, metres.
     #[schemars(with = "[f32; 3]")]
     pub target: Vec3,
 }

@@ -31,7 +31,7 @@ pub struct ScenarioPart {
     pub seed: Option<u64>,
     /// Ticks per second, 1..=1000.
     pub tick_hz: Option<u32>,
-    /// Length, up to a day.
+    /// Length, s, above 0 to a day.
     pub seconds: Option<f32>,
     /// m/s².
     #[schemars(with = "Option<[f32; 3]>")]
@@ -94,7 +94,7 @@ pub struct EmitterChange {
     pub flow: Option<Flow>,
     /// m/s.
     pub speed: Option<f32>,
-    /// Half-angle of the cone of directions.
+    /// Half-angle of the cone of directions, degrees, 0..=180.
     pub spread_deg: Option<f32>,
     /// Seconds until a particle that hits nothing is removed.
     pub lifetime: Option<f32>,

@@ -23,15 +23,15 @@ pub struct SceneSpec {
     pub name: String,
     /// `.glb` or `.gltf`.
     pub file: String,
-    /// Position of its origin.
+    /// Position of its origin, metres.
     #[serde(default)]
     #[schemars(with = "[f32; 3]")]
     pub position: Vec3,
-    /// Turns around Y, then X, then Z.
+    /// Turns around Y, then X, then Z, degrees.
     #[serde(default)]
     #[schemars(with = "[f32; 3]")]
     pub rotation_deg: Vec3,
-    /// Per axis, above 0.
+    /// Times as large, per axis; above 0.
     #[serde(default = "default_scale")]
     #[schemars(with = "[f32; 3]")]
     pub scale: Vec3,

@@ -12,20 +12,20 @@ use crate::scenes::stone::Stone;
 #[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, PartialEq)]
 #[serde(deny_unknown_fields, default)]
 pub struct MaterialSpec {
-    /// Linear RGB; multiplies the texture.
+    /// Linear RGB, 0..=1; multiplies the texture.
     pub color: [f32; 3],
     /// Colour, normal and roughness maps.
     pub texture: TextureSpec,
-    /// Repeats of the texture over the uv square.
+    /// Repeats of the texture over the uv square, above 0 to 10,000.
     #[schemars(with = "[f32; 2]")]
     pub tiles: Vec2,
-    /// Perceptual roughness; multiplies the texture's.
+    /// Perceptual roughness, 0..=1; multiplies the texture's.
     pub roughness: f32,
-    /// Bevy's reflectance: F0 = 0.16 reflectance².
+    /// Bevy's reflectance, 0..=1: F0 = 0.16 reflectance².
     pub reflectance: f32,
-    /// Metal: takes up no water.
+    /// How much of it is metal, which takes up no water, 0..=1.
     pub metallic: f32,
-    /// Part of the diffuse light that comes out at the back, dry.
+    /// Part of the diffuse light that comes out at the back, dry, 0..=1.
     pub translucency: f32,
     /// Seen from both sides.
     pub double_sided: bool,
@@ -99,15 +99,15 @@ pub struct SurfaceSpec {
     pub mesh: MeshSpec,
     /// Name of its material.
     pub material: String,
-    /// Position of its origin.
+    /// Position of its origin, metres.
     #[serde(default)]
     #[schemars(with = "[f32; 3]")]
     pub position: Vec3,
-    /// Turns around Y, then X, then Z.
+    /// Turns around Y, then X, then Z, degrees.
     #[serde(default)]
     #[schemars(with = "[f32; 3]")]
     pub rotation_deg: Vec3,
-    /// Per axis, not 0.
+    /// Times as large, per axis; not 0.
     #[serde(default = "default_scale")]
     #[schemars(with = "[f32; 3]")]
     pub scale: Vec3,
@@ -125,7 +125,7 @@ pub struct SurfaceSpec {
 pub struct WetMapSpec {
     /// `.png`, as `weathering wetmap` makes them.
     pub map: String,
-    /// From dry to wet or back.
+    /// Seconds from dry to wet or back, above 0 to a day.
     pub seconds: f32,
     /// Softness of the wet border, 0..=1.
     #[serde(default = "default_map_fill")]

@@ -2,7 +2,8 @@
 
 use bevy::prelude::*;
 
-use super::{Expectations, MaterialStep, Timeline, due, emitter_motion, expect};
+use super::steps::{MaterialStep, Timeline};
+use super::{Expectations, due, emitter_motion, expect};
 use crate::brush::{BrushQueue, Stroke, paint_strokes};
 use crate::clock::WeatheringClock;
 use crate::emitter::Emitter;

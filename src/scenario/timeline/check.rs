@@ -2,9 +2,10 @@
 
 use std::collections::BTreeSet;
 
+use super::steps::WeatherStep;
 use super::{
     Action, BrushEvent, EmitterAdjustment, EmitterMove, EventSpec, Expectation, MaterialChange, Quantity,
-    WeatherStep, in_order, tick_from,
+    in_order, tick_from,
 };
 use crate::material::PorousMaterial;
 use crate::scenario::validate::{FAR, check_weather};

@@ -79,10 +79,10 @@ impl Action {
 pub struct EmitterMove {
     /// Its name.
     pub emitter: String,
-    /// Where to.
+    /// Where to, metres.
     #[schemars(with = "[f32; 3]")]
     pub position: Vec3,
-    /// What it aims at from there.
+    /// What it aims at from there, metres.
     #[schemars(with = "[f32; 3]")]
     pub target: Vec3,
     /// Seconds that it takes; 0 is at once.
@@ -109,7 +109,7 @@ pub struct EmitterAdjustment {
     /// m/s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub speed: Option<f32>,
-    /// Half-angle of the cone of directions.
+    /// Half-angle of the cone of directions, degrees, 0..=180.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spread_deg: Option<f32>,
     /// Seconds until a particle that hits nothing is removed.
@@ -160,10 +160,10 @@ pub struct WeatherChange {
 #[derive(Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct CameraMove {
-    /// Position of the eye.
+    /// Position of the eye, metres.
     #[schemars(with = "[f32; 3]")]
     pub eye: Vec3,
-    /// What it looks at.
+    /// What it looks at, metres.
     #[schemars(with = "[f32; 3]")]
     pub target: Vec3,
 }
@@ -246,10 +246,10 @@ pub struct Expectation {
     /// The name of the surface; left out for `Particles`.
     #[serde(default)]
     pub surface: Option<String>,
-    /// It is more than this.
+    /// It is more than this, in the unit of the quantity.
     #[serde(default)]
     pub above: Option<f64>,
-    /// It is less than this.
+    /// It is less than this, in the unit of the quantity.
     #[serde(default)]
     pub below: Option<f64>,
 }

@@ -290,12 +290,12 @@ mod tests {
 
     use serde_json::{Value, json};
 
+    use super::super::test_file::write_with_triangle;
     use super::*;
 
     /// A triangle that nodes show; `edit` makes it another file.
     fn file(folder: &Path, edit: impl FnOnce(&mut Value)) -> PathBuf {
-        let mut json = json!({
-            "asset": { "version": "2.0" },
+        let json = json!({
             "scenes": [{ "nodes": [0] }],
             "nodes": [
                 { "name": "carrier", "translation": [0.0, 5.0, 0.0], "children": [1, 2] },
@@ -311,17 +311,8 @@ mod tests {
                 ] },
             ],
             "materials": [{}],
-            "buffers": [{ "uri": "corners.bin", "byteLength": 36 }],
-            "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
-            "accessors": [{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
-                "min": [0.0, 0.0, 0.0], "max": [1.0, 1.0, 0.0] }],
         });
-        edit(&mut json);
-        let corners = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
-        std::fs::write(folder.join("corners.bin"), corners.map(f32::to_le_bytes).as_flattened()).unwrap();
-        let path = folder.join("scene.gltf");
-        std::fs::write(&path, json.to_string()).unwrap();
-        path
+        write_with_triangle(&folder.join("scene.gltf"), json, edit)
     }
 
     fn names(edit: impl FnOnce(&mut Value)) -> Result<Vec<String>, String> {

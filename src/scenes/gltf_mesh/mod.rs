@@ -16,6 +16,8 @@
 
 mod file;
 mod layout;
+#[cfg(test)]
+pub(crate) mod test_file;
 mod uri;
 
 use std::path::{Path, PathBuf};
