@@ -11,7 +11,7 @@ use crate::effect::WeatherEffect;
 #[derive(Component, Serialize, Deserialize, Debug, Clone, Default, PartialEq)]
 pub struct EmitterState {
     /// Particles owed, times the tick rate: stays exact in `f64` for any `f32` rate.
-    owed: f64,
+    pub(super) owed: f64,
     /// Water owed below a whole nanolitre.
     owed_nl: f64,
     /// Of a flow: water, nanolitres, of particles that were not sent and that no other could take along yet.
