@@ -2,7 +2,7 @@
 //!
 //! What deforms moves in most frames. It has a part of its own, so that the rest need not be put together anew.
 
-use bevy::math::Affine3A;
+use bevy::math::{Affine3A, Vec3A};
 use bevy::prelude::*;
 
 use super::bvh::{BoxBvh, Segment};
@@ -87,9 +87,10 @@ impl CollisionScene {
     #[inline]
     pub fn cast(&self, start: Vec3, end: Vec3) -> Option<SceneHit> {
         // Most particles are in the air: this is all they cost.
-        let is_clear = || self.clearance.as_ref().is_some_and(|clearance| clearance.is_clear(start, end));
-        let rigid = segment_near_box(start, end, self.rigid.bounds) && !is_clear();
-        let deforming = segment_near_box(start, end, self.deforming.bounds);
+        let (from, to) = (Vec3A::from(start), Vec3A::from(end));
+        let is_clear = || self.clearance.as_ref().is_some_and(|clearance| clearance.is_clear(from, to));
+        let rigid = segment_near_box(from, to, self.rigid.bounds) && !is_clear();
+        let deforming = segment_near_box(from, to, self.deforming.bounds);
         if !(rigid || deforming) {
             return None;
         }
@@ -238,8 +239,8 @@ fn uv_directions([ab, ac]: [Vec3; 2], [uv_ab, uv_ac]: [Vec2; 2]) -> (Vec2, [Vec3
 
 /// Whether the box around the segment touches the box. Never false for a segment that does.
 #[inline]
-fn segment_near_box(start: Vec3, end: Vec3, (min, max): (Vec3, Vec3)) -> bool {
-    (start.min(end).cmple(max) & start.max(end).cmpge(min)).all()
+fn segment_near_box(start: Vec3A, end: Vec3A, (min, max): (Vec3, Vec3)) -> bool {
+    (start.min(end).cmple(max.into()) & start.max(end).cmpge(min.into())).all()
 }
 
 /// Follows surfaces that appear, move, deform or go. Costs nothing while none does.
