@@ -163,7 +163,12 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
             specular: maps.specular,
             normal: maps.normal,
         });
-        SavedScene::capture(run.app.world_mut(), &options.scenario, colors.collect()).write(folder)?;
+        let world = run.app.world_mut();
+        let mut scene = SavedScene::capture(world, &options.scenario, colors.collect());
+        if let Some(saved) = &saved {
+            scene = scene.with_all_of(world, saved)?;
+        }
+        scene.write(folder)?;
     }
     if let (Some(export), Some(folder)) = (export, &options.export) {
         export?.write(folder, &options.stem())?;

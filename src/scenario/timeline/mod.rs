@@ -8,6 +8,7 @@
 //! An event at second `at` acts in the first tick that begins then or later, as an emitter's `start` does; what only looks
 //! sees the end of the first tick that ends then or later. So an expectation sees nothing of what happens at its own time.
 
+mod append;
 mod apply;
 mod check;
 mod events;
@@ -27,6 +28,7 @@ pub use events::{
 };
 pub use expect::{ExpectationOutcome, Expectations};
 
+pub(crate) use append::append_events;
 pub(super) use apply::{MaterialHandles, apply_events_plugin, insert_events};
 pub(crate) use apply::{exchange_events, rewind};
 
@@ -121,9 +123,9 @@ fn in_order(scenario: &Scenario) -> Vec<(usize, &EventSpec)> {
     events
 }
 
-/// Whether the weather is on its way from one state to another in a tick.
-pub(crate) fn weather_is_changing(scenario: &Scenario, tick: u32) -> bool {
-    let changes = Timeline::new(scenario).changes;
+/// Whether the weather is on its way from one state to another in a tick of the scenario that runs.
+pub(crate) fn weather_is_changing(world: &World, tick: u32) -> bool {
+    let changes = world.get_resource::<Timeline>().map_or(&[][..], |timeline| &timeline.changes);
     changes.iter().any(|step| step.last > step.first && (step.first..=step.last).contains(&tick))
 }
 
@@ -164,33 +166,43 @@ impl WeatherStep {
 impl Timeline {
     /// What happens in a scenario that has been checked.
     pub(super) fn new(scenario: &Scenario) -> Self {
-        let hz = scenario.tick_hz;
         let mut timeline = Self { weather: scenario.weather(), ..default() };
-        let mut weather = timeline.weather;
-        for (_, EventSpec { at, what }) in in_order(scenario) {
-            let tick = tick_from(*at, hz);
-            if what.acts() {
-                timeline.acts.push((tick, hash(what)));
-            }
-            match what {
-                Action::Weather(change) => {
-                    let step = WeatherStep::new(change, weather, tick, hz);
-                    weather = step.to;
-                    timeline.changes.push(step);
-                }
-                Action::Brush(event) => {
-                    let surface = event.surface.as_deref().and_then(|name| scenario.surface_number(name));
-                    timeline.strokes.push(BrushStep { tick, brush: event.brush(), surface });
-                }
-                Action::Material(change) => timeline.add_material(scenario, change, tick),
-                Action::Adjust(adjustment) => timeline.add_adjustment(scenario, adjustment, tick),
-                _ => {}
-            }
+        for (_, event) in in_order(scenario) {
+            timeline.add(scenario, event);
         }
-        // What surfaces and emitters are at first was put in when they first changed.
-        timeline.materials.sort_by_key(|step| step.tick);
-        timeline.emitters.sort_by_key(|step| step.tick);
+        timeline.sort();
         timeline
+    }
+
+    /// Adds an event behind all others that change what it changes. Then the lists have to be sorted.
+    fn add(&mut self, scenario: &Scenario, EventSpec { at, what }: &EventSpec) {
+        let hz = scenario.tick_hz;
+        let tick = tick_from(*at, hz);
+        if what.acts() {
+            self.acts.push((tick, hash(what)));
+        }
+        match what {
+            Action::Weather(change) => {
+                let weather = self.changes.last().map_or(self.weather, |step| step.to);
+                self.changes.push(WeatherStep::new(change, weather, tick, hz));
+            }
+            Action::Brush(event) => {
+                let surface = event.surface.as_deref().and_then(|name| scenario.surface_number(name));
+                self.strokes.push(BrushStep { tick, brush: event.brush(), surface });
+            }
+            Action::Material(change) => self.add_material(scenario, change, tick),
+            Action::Adjust(adjustment) => self.add_adjustment(scenario, adjustment, tick),
+            _ => {}
+        }
+    }
+
+    /// Puts the lists in order of ticks; what is of the same one stays as it came. Weather is in order always.
+    fn sort(&mut self) {
+        // What surfaces and emitters are at first was put in when they first changed.
+        self.materials.sort_by_key(|step| step.tick);
+        self.emitters.sort_by_key(|step| step.tick);
+        self.strokes.sort_by_key(|step| step.tick);
+        self.acts.sort_by_key(|(tick, _)| *tick);
     }
 
     fn add_material(&mut self, scenario: &Scenario, change: &MaterialChange, tick: u32) {
@@ -286,19 +298,27 @@ fn named<'a>(
 
 /// When an emitter works and where it is, with what events say of it.
 pub(super) fn emitter_motion(scenario: &Scenario, spec: &EmitterSpec) -> EmitterMotion {
-    let hz = scenario.tick_hz;
-    let (mut legs, mut switches) = (Vec::new(), Vec::new());
-    for (_, EventSpec { at, what }) in in_order(scenario) {
+    let (keys, stop) = (spec.keys.clone(), spec.stop.unwrap_or(scenario.seconds));
+    let mut motion = EmitterMotion { keys, legs: Vec::new(), start: spec.start, stop, switches: Vec::new() };
+    for (_, event) in in_order(scenario) {
+        motion.add(&spec.name, event, scenario.tick_hz);
+    }
+    motion
+}
+
+impl EmitterMotion {
+    /// Adds an event behind all others, if it is about the emitter of this name.
+    fn add(&mut self, emitter: &str, EventSpec { at, what }: &EventSpec, hz: u32) {
         match what {
-            Action::Start(name) if *name == spec.name => switches.push((tick_from(*at, hz), true)),
-            Action::Stop(name) if *name == spec.name => switches.push((tick_from(*at, hz), false)),
-            Action::Move(step) if step.emitter == spec.name => {
+            Action::Start(name) if name == emitter => self.switches.push((tick_from(*at, hz), true)),
+            Action::Stop(name) if name == emitter => self.switches.push((tick_from(*at, hz), false)),
+            Action::Move(step) if step.emitter == emitter => {
                 let t = *at as f32;
                 // A move that is under way ends here; what was before is not touched.
-                let Some((position, target)) = pose(&spec.keys, &legs, t) else { continue };
+                let Some((position, target)) = pose(&self.keys, &self.legs, t) else { return };
                 // What is at once is done by the end of the first tick that begins then, and not before.
                 let arrives = t + step.over.max(0.5 / hz as f32);
-                legs.push(Leg {
+                self.legs.push(Leg {
                     from: EmitterKey { t, position, target },
                     to: EmitterKey { t: arrives, position: step.position, target: step.target },
                 });
@@ -306,8 +326,6 @@ pub(super) fn emitter_motion(scenario: &Scenario, spec: &EmitterSpec) -> Emitter
             _ => {}
         }
     }
-    let stop = spec.stop.unwrap_or(scenario.seconds);
-    EmitterMotion { keys: spec.keys.clone(), legs, start: spec.start, stop, switches }
 }
 
 #[cfg(test)]
@@ -317,7 +335,7 @@ mod tests {
     use super::*;
 
     /// Two surfaces of two materials and an emitter, at 10 ticks a second.
-    fn scenario(events: &str) -> Scenario {
+    pub(super) fn scenario(events: &str) -> Scenario {
         let text = format!(
             r#"(
                 seconds: 10.0,

@@ -4,16 +4,14 @@ use std::path::{Path, PathBuf};
 
 use bevy::prelude::*;
 use bevy_egui::egui;
-use bevy_weathering::particle::Particles;
 use bevy_weathering::record::Recording;
 use bevy_weathering::scenario::ScenarioStatus;
 
-use super::super::open::Opened;
+use super::super::export;
 use super::super::shots::OutFolder;
 use super::super::split::Split;
 use super::super::ui::Note;
 use super::super::weather::OwnRain;
-use super::super::{added, export};
 use super::is_busy;
 use super::steps::{begin, begin_restoring};
 
@@ -55,7 +53,6 @@ fn obstacle(world: &mut World) -> Option<&'static str> {
     if export::is_reading(world) {
         return Some("Wait until the scene is read for the export.");
     }
-    let rows = world.resource::<Opened>().effects;
     if world.contains_resource::<Recording>() {
         return Some("End the recording first: it keeps moments of its own.");
     }
@@ -66,12 +63,7 @@ fn obstacle(world: &mut World) -> Option<&'static str> {
     if rain.iter(world).next().is_some() {
         return Some("Switch the rain over the scene off: it is no part of the scenario.");
     }
-    if added::is_any(world) {
-        return Some("Remove the emitters that were added: they are no part of the scenario.");
-    }
-    let particles = world.resource::<Particles>().effects();
-    let is_strange = particles.iter().any(|effect| usize::from(effect.0) >= rows);
-    is_strange.then_some("Wait until what the hose in the hand has sprayed has landed.")
+    None
 }
 
 /// Buttons to save and to go on.
@@ -104,14 +96,12 @@ pub fn show(ui: &mut egui::Ui, world: &mut World) {
             }
         }
     }
-    let is_alone = !world.contains_resource::<Split>()
-        && !world.contains_resource::<Recording>()
-        && !added::is_any(world);
+    let is_alone = !world.contains_resource::<Split>() && !world.contains_resource::<Recording>();
     let is_saved = is_alone && path.join("state.ron").is_file();
     if is_saved
         && ui.button("Go on from there").on_hover_text("Of the same scenario only").clicked()
         && let Err(error) = begin_restoring(world, &path)
     {
-        world.resource_mut::<Note>().complain(error.to_string());
+        world.resource_mut::<Note>().complain(error);
     }
 }

@@ -8,13 +8,15 @@ use bevy_weathering::clock::ShownTime;
 use bevy_weathering::export::{ColorReadback, SurfaceColors};
 use bevy_weathering::overlay::Overlays;
 use bevy_weathering::record;
-use bevy_weathering::save::{ColorMaps, SaveError, SavedScene};
+use bevy_weathering::save::{ColorMaps, SavedScene};
 use bevy_weathering::scenario::{LoadedScenario, ScenarioSurface, reset_scenario};
 
+use super::super::added;
 use super::super::hose::InHand;
 use super::super::leave::Leaving;
 use super::super::open::Opened;
 use super::super::ui::Note;
+use super::super::undo::Undo;
 use super::{Purpose, SETTLE, Saving, Step};
 
 /// What of the sandbox's own is not to be saved, nor in the way of what was.
@@ -62,8 +64,14 @@ pub fn give_up_moment(world: &mut World) {
 }
 
 /// Reads a scene, and takes this one back to its beginning.
-pub(super) fn begin_restoring(world: &mut World, folder: &Path) -> Result<(), SaveError> {
-    let scene = Box::new(SavedScene::read(folder)?);
+///
+/// # Errors
+/// What is wrong; then nothing has happened.
+pub(super) fn begin_restoring(world: &mut World, folder: &Path) -> Result<(), String> {
+    let scene = Box::new(SavedScene::read(folder).map_err(|error| error.to_string())?);
+    if !scene.has_emitters() && added::is_any(world) {
+        return Err("Remove the emitters that were added: it says nothing of emitters".into());
+    }
     put_tools_away(world);
     world.resource_mut::<Time<Virtual>>().pause();
     reset_scenario(world);
@@ -75,6 +83,8 @@ pub(super) fn begin_restoring(world: &mut World, folder: &Path) -> Result<(), Sa
 fn restore(world: &mut World, folder: &Path, scene: &SavedScene) {
     let scenario = world.resource::<Opened>().loaded.clone();
     let restored = scene.restore(world, &scenario, folder);
+    // It was about the scene that was there.
+    world.resource_mut::<Undo>().clear();
     let mut note = world.resource_mut::<Note>();
     match restored {
         Ok(()) => note.tell(format!("went on from {}, paused", folder.display())),
@@ -155,7 +165,15 @@ fn take(world: &mut World, purpose: Purpose, colors: Vec<ColorMaps>) -> Option<S
     };
     let scenario: LoadedScenario = world.resource::<Opened>().loaded.clone();
     // Sliders have been at them.
-    let scene = SavedScene::capture(world, &scenario, colors).with_materials(world);
+    let scene = SavedScene::capture(world, &scenario, colors).with_materials(world).with_emitters(world);
+    let scene = match scene {
+        Ok(scene) => scene,
+        Err(error) => {
+            world.resource_mut::<Leaving>().0 = false;
+            world.resource_mut::<Note>().complain(error.to_string());
+            return None;
+        }
+    };
     let to = folder.clone();
     let task = AsyncComputeTaskPool::get().spawn(async move { scene.write(&to) });
     Some(Step::Writing { folder, task })
