@@ -206,8 +206,9 @@ impl EmitterSettings {
         for (index, text) in self.effects.iter().enumerate() {
             let read = WeatherEffect::from_ron(text.as_bytes()).and_then(WeatherEffect::with_stamps);
             let field = format!("settings.effects[{index}]");
-            let refused = |error| value(path, &field, "unusable", format!("the text of an effect: {error}"));
-            effects.push(read.map_err(refused)?);
+            effects.push(read.map_err(|error| {
+                value(path, &field, "unusable", format!("the text of an effect that can be used: {error}"))
+            })?);
         }
         let numbers = own_effects(world).len() + effects.len();
         let mut least = 0;

@@ -31,6 +31,13 @@ const AIM: f32 = 4.0;
 #[derive(Component, Debug, Clone, PartialEq, Eq)]
 pub struct Stay(Range<u32>);
 
+impl Stay {
+    /// Whether its time has not come yet.
+    pub fn is_to_come(&self, tick: u32) -> bool {
+        tick < self.0.start
+    }
+}
+
 /// What is added, and where.
 #[derive(Resource, Clone)]
 struct Choice {
@@ -87,19 +94,19 @@ pub fn keep_stays(world: &mut World) {
     }
 }
 
-/// Emitters whose time is over, or has not come, are as if removed.
+/// Emitters whose time is over have been removed, until the scene is started over.
 fn follow_stays(
     clock: Res<WeatheringClock>,
     emitters: Query<(Entity, &Stay, Has<RemovedEmitter>, Has<ByHand>)>,
     mut commands: Commands,
 ) {
     for (emitter, stay, is_removed, is_by_hand) in &emitters {
-        match (stay.0.contains(&clock.tick()), is_removed) {
-            (true, true) => {
+        match (clock.tick() >= stay.0.end, is_removed) {
+            (false, true) => {
                 commands.entity(emitter).remove::<(RemovedEmitter, ByHand)>();
             }
             // What somebody has taken in hand is theirs.
-            (false, false) if !is_by_hand => {
+            (true, false) if !is_by_hand => {
                 commands.entity(emitter).insert(RemovedEmitter);
             }
             _ => {}
@@ -404,8 +411,10 @@ mod tests {
     fn what_was_removed_in_a_session_stays_so_when_its_recording_has_ended() {
         let mut world = world();
         let emitter = world.spawn((SceneEntity, Emitter { enabled: false, ..default() }, Stay(10..50))).id();
-        let there = [60, 49, 9, 10, 50].map(|tick| is_there_at(&mut world, emitter, tick));
-        assert_eq!(there, [false, true, false, true, false]);
+        let there = [60, 49, 9, 50].map(|tick| is_there_at(&mut world, emitter, tick));
+        assert_eq!(there, [false, true, true, false]);
+        let stay = world.get::<Stay>(emitter).unwrap();
+        assert!(stay.is_to_come(9) && !stay.is_to_come(10));
         // Its events keep it off: nobody has taken it in hand.
         assert!(world.get::<ByHand>(emitter).is_none());
         // In its time it may be removed for good, and that be taken back.

@@ -2,13 +2,14 @@
 
 use bevy::prelude::*;
 use bevy_egui::egui;
+use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::emitter::{Emitter, EmitterShape, EmitterState, Flow};
 use bevy_weathering::particle::{ParticleConfig, ParticleCounts};
 use bevy_weathering::record::Recording;
 use bevy_weathering::save::{AddedEmitter, RemovedEmitter};
 use bevy_weathering::scenario::{ByHand, SceneEntity};
 
-use super::added;
+use super::added::{self, Stay};
 use super::effects;
 use super::hose::InHand;
 use super::split::CopyOf;
@@ -34,12 +35,14 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
         ui.label(format!("{} not sent: others carry what they would", counts.merged));
     }
     added::show(ui, world);
-    let mut query = world.query_filtered::<(Entity, &Emitter, Option<&Name>), Listed>();
+    let mut query = world.query_filtered::<(Entity, &Emitter, Option<&Name>, Option<&Stay>), Listed>();
+    let tick = world.resource::<WeatheringClock>().tick();
     let recording = world.get_resource::<Recording>();
     let mut all: Vec<(u32, Entity, String)> = query
         .iter(world)
         .filter(|(entity, ..)| recording.is_none_or(|recording| recording.has_emitter(*entity)))
-        .map(|(entity, emitter, name)| {
+        .filter(|(.., stay)| stay.is_none_or(|stay| !stay.is_to_come(tick)))
+        .map(|(entity, emitter, name, _)| {
             (emitter.stream, entity, name.map_or_else(|| "emitter".to_owned(), ToString::to_string))
         })
         .collect();
