@@ -1,8 +1,8 @@
 //! Saving the scene into a folder and going on from one, with `src/save`.
 //!
 //! Colour maps live on the GPU: time is paused, they are read back, and then all is written on another thread. What has been
-//! saved here is a scenario's state and goes on in `weathering replay --resume`, too; so nothing of the sandbox's own may be in
-//! it.
+//! saved here is a scenario's state, with emitters as they are set and those that were added, and goes on in
+//! `weathering replay --resume`, too; so nothing else of the sandbox's own may be in it.
 
 mod panel;
 mod steps;
