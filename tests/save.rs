@@ -187,6 +187,12 @@ fn emitter(world: &mut World, name: &str) -> Entity {
     emitters.iter(world).find(|(_, other)| other.as_str() == name).unwrap().0
 }
 
+/// What the tap has sent so far.
+fn sent(world: &mut World) -> u64 {
+    let tap = emitter(world, "tap");
+    world.get::<EmitterState>(tap).unwrap().emitted
+}
+
 /// The scene with all that was made of emitters.
 fn with_emitters(world: &mut World, scenario: &LoadedScenario) -> SavedScene {
     let colors = colors_at_hand(world).unwrap();
@@ -221,10 +227,6 @@ fn what_somebody_has_made_of_emitters_is_kept_if_it_is_asked_for() {
     let mut edited = with_a_tap(&scenario);
     let (kept, again) = (folder.path().join("kept"), folder.path().join("again"));
     let world = edited.world_mut();
-    let sent = |world: &mut World| {
-        let tap = emitter(world, "tap");
-        world.get::<EmitterState>(tap).unwrap().emitted
-    };
     assert!(sent(world) > 10 && !world.resource::<Particles>().is_empty());
     with_emitters(world, &scenario).write(&kept).unwrap();
     // Without them it does not fit: there is one that the scenario has not.
