@@ -125,7 +125,7 @@ fn in_order(scenario: &Scenario) -> Vec<(usize, &EventSpec)> {
 
 /// Whether the weather is on its way from one state to another in a tick of the scenario that runs.
 pub(crate) fn weather_is_changing(world: &World, tick: u32) -> bool {
-    let changes = world.get_resource::<Timeline>().map_or(&[][..], |timeline| &timeline.changes);
+    let changes = world.get_resource::<Timeline>().map_or(&[][..], |timeline| &timeline.changes[..]);
     changes.iter().any(|step| step.last > step.first && (step.first..=step.last).contains(&tick))
 }
 
