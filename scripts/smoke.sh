@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Opens the sandbox on a virtual screen and uses it as a person would: keys, mouse, panels, saving. Fails if the first picture comes
-# too late or black, if the program ends before it is told to, if it does not answer, or if a picture is of one colour.
+# too late or black, if the program ends before it is told to, if it does not answer, if a stroke of a brush cannot be taken back, or
+# if a picture is of one colour.
 # Arguments: folder for pictures and the saved scene [out/smoke], scene [the hose].
 # WEATHERING_PROGRAM: a program that is built already; WEATHERING_START_SECONDS: when the first picture has to be there [5].
 set -euo pipefail
@@ -135,6 +136,7 @@ for _ in 1 2 3 4 5 6; do xdotool mousemove_relative 12 3; sleep 0.2; done
 xdotool mouseup 1
 shot "a stroke of a brush"
 xdotool key ctrl+z
+await "the stroke to be taken back" 30 grep -q "took a stroke back" "${scratch}/log"
 shot "a stroke taken back"
 
 # Probe, maps, plots; then all panels by their tabs, in the first two rows at the left.

@@ -5,10 +5,13 @@ use std::path::Path;
 
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
+use bevy_weathering::effect::WeatherEffect;
+use bevy_weathering::emitter::{Emitter, EmitterShape, EmitterState};
 use bevy_weathering::material::{PorousMaterial, StandingWater};
+use bevy_weathering::particle::Particles;
 use bevy_weathering::record::colors_at_hand;
-use bevy_weathering::save::SavedScene;
-use bevy_weathering::scenario::{Scenario, ScenarioSurface};
+use bevy_weathering::save::{AddedEmitter, RemovedEmitter, SavedScene};
+use bevy_weathering::scenario::{ByHand, LoadedScenario, Scenario, ScenarioSurface, scene_digest};
 use serde_json::Value;
 
 use super::record::ready;
@@ -171,6 +174,152 @@ fn what_somebody_has_made_of_a_surface_is_kept_if_it_is_asked_for() {
     let mut other = ready(scenario.clone());
     let refused = SavedScene::read(&to).unwrap().restore(other.world_mut(), &scenario, &to).unwrap_err();
     assert!(refused.to_string().contains("materials of floor: levelling_mm"), "{refused}");
+}
+
+/// So many frames of so many ticks.
+fn go_on(app: &mut App, frames: u32, ticks: u32) {
+    app.insert_resource(TimeUpdateStrategy::FixedTimesteps(ticks));
+    (0..frames).for_each(|_| app.update());
+}
+
+fn emitter(world: &mut World, name: &str) -> Entity {
+    let mut emitters = world.query_filtered::<(Entity, &Name), With<Emitter>>();
+    emitters.iter(world).find(|(_, other)| other.as_str() == name).unwrap().0
+}
+
+/// What the tap has sent so far.
+fn sent(world: &mut World) -> u64 {
+    let tap = emitter(world, "tap");
+    world.get::<EmitterState>(tap).unwrap().emitted
+}
+
+/// The scene with all that was made of emitters.
+fn with_emitters(world: &mut World, scenario: &LoadedScenario) -> SavedScene {
+    let colors = colors_at_hand(world).unwrap();
+    SavedScene::capture(world, scenario, colors).with_emitters(world).unwrap()
+}
+
+/// The scenario of ten minutes with the rain in somebody's hand, and a tap that was added, after some seconds.
+fn with_a_tap(scenario: &LoadedScenario) -> App {
+    let mut app = ready(scenario.clone());
+    let world = app.world_mut();
+    let rain = emitter(world, "rain");
+    let mut edited = world.get_mut::<Emitter>(rain).unwrap();
+    (edited.rate, edited.speed, edited.enabled) = (40.0, 2.5, true);
+    edited.shape = EmitterShape::Sky { half_size: Vec2::new(0.25, 0.5) };
+    let place = Transform::from_xyz(0.1, 1.5, 0.2);
+    world.entity_mut(rain).insert((ByHand, place, GlobalTransform::from(place)));
+    // Of an effect that the scenario has not.
+    let effect = WeatherEffect { volume_mm3: 500.0, stamp_radius: Some(0.02), ..default() };
+    let effect = world.resource_mut::<Assets<WeatherEffect>>().add(effect);
+    let place = Transform::from_xyz(0.2, 3.0, -0.3).looking_to(Vec3::NEG_Y, Vec3::X);
+    let tap = Emitter { effect, rate: 30.0, speed: 0.5, stream: 1 << 29, ..default() };
+    world.spawn((AddedEmitter, Name::new("tap"), tap, place, GlobalTransform::from(place)));
+    go_on(&mut app, 3, 20);
+    app
+}
+
+#[test]
+fn what_somebody_has_made_of_emitters_is_kept_if_it_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = ten_minutes(folder.path());
+    let scenario = Scenario::load(&file).unwrap();
+    let mut edited = with_a_tap(&scenario);
+    let (kept, again) = (folder.path().join("kept"), folder.path().join("again"));
+    let world = edited.world_mut();
+    assert!(sent(world) > 10 && !world.resource::<Particles>().is_empty());
+    with_emitters(world, &scenario).write(&kept).unwrap();
+    // Without them it does not fit: there is one that the scenario has not.
+    let colors = colors_at_hand(world).unwrap();
+    let plain = SavedScene::capture(world, &scenario, colors);
+    let mut other = ready(scenario.clone());
+    let refused = plain.restore(other.world_mut(), &scenario, &kept).unwrap_err().to_string();
+    assert!(refused.contains("`emitters` is 2"), "{refused}");
+
+    let scene = SavedScene::read(&kept).unwrap();
+    assert!(scene.has_emitters() && !plain.has_emitters());
+    let world = other.world_mut();
+    scene.restore(world, &scenario, &kept).unwrap();
+    let (rain, tap) = (emitter(world, "rain"), emitter(world, "tap"));
+    let of = |emitter: Entity| {
+        let emitter = world.get::<Emitter>(emitter).unwrap();
+        (emitter.rate, emitter.speed, emitter.shape, emitter.stream)
+    };
+    let sky = EmitterShape::Sky { half_size: Vec2::new(0.25, 0.5) };
+    assert_eq!(of(rain), (40.0, 2.5, sky, 0));
+    assert_eq!(of(tap), (30.0, 0.5, EmitterShape::Point, 1 << 29));
+    assert!(world.get::<ByHand>(rain).is_some() && world.get::<AddedEmitter>(tap).is_some());
+    assert_eq!(world.get::<Transform>(rain).unwrap().translation, Vec3::new(0.1, 1.5, 0.2));
+    // What is restored and saved at once is the same.
+    with_emitters(world, &scenario).write(&again).unwrap();
+    let state = |folder: &Path| fs::read_to_string(folder.join("state.ron")).unwrap();
+    assert!(state(&kept) == state(&again));
+    // Both go on alike, with what is in flight.
+    go_on(&mut other, 3, 0);
+    let [one, two] = [&mut edited, &mut other].map(|app| {
+        go_on(app, 2, 20);
+        (scene_digest(app.world_mut()), sent(app.world_mut()))
+    });
+    assert_eq!(one, two);
+    // A second time in the same world: what was there makes room.
+    go_on(&mut other, 1, 0);
+    let world = other.world_mut();
+    scene.restore(world, &scenario, &kept).unwrap();
+    let mut added = world.query_filtered::<(), With<AddedEmitter>>();
+    assert_eq!(added.iter(world).count(), 1);
+
+    // The program goes on with it, and saves it again.
+    let mut command = replay(&file, "--no-render --seconds 4 --resume");
+    run(command.arg(&kept).arg("--save-state").arg(&again)).assert_success();
+    assert!(SavedScene::read(&again).unwrap().has_emitters() && state(&again).contains("\"tap\""));
+}
+
+#[test]
+fn an_emitter_that_was_removed_stays_so_in_what_is_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = Scenario::load(&ten_minutes(folder.path())).unwrap();
+    let mut edited = ready(scenario.clone());
+    let world = edited.world_mut();
+    let rain = emitter(world, "rain");
+    world.entity_mut(rain).insert(RemovedEmitter);
+    let scene = with_emitters(world, &scenario);
+    let mut other = ready(scenario.clone());
+    scene.restore(other.world_mut(), &scenario, folder.path()).unwrap();
+    go_on(&mut other, 2, 20);
+    let world = other.world_mut();
+    let rain = emitter(world, "rain");
+    assert!(world.get::<RemovedEmitter>(rain).is_some() && !world.get::<Emitter>(rain).unwrap().enabled);
+    assert_eq!(world.get::<EmitterState>(rain).unwrap().emitted, 0);
+}
+
+#[test]
+fn emitters_that_cannot_be_are_refused_by_field() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = Scenario::load(&ten_minutes(folder.path())).unwrap();
+    let mut edited = with_a_tap(&scenario);
+    let kept = folder.path().join("kept");
+    with_emitters(edited.world_mut(), &scenario).write(&kept).unwrap();
+    let mut other = ready(scenario.clone());
+    let state = kept.join("state.ron");
+    let text = fs::read_to_string(&state).unwrap();
+    for (was, is, named) in [
+        ("rate: 40.0", "rate: -1.0", "`settings.emitters[0].rate` is -1"),
+        ("rate: 30.0", "rate: NaN", "`settings.emitters[1].rate` is NaN"),
+        ("role: ByHand", "role: Added", "`settings.emitters"),
+        ("role: Added", "role: Scripted", "`settings.emitters"),
+        ("stream: 536870912", "stream: 0", "`settings.emitters[1].stream` is 0"),
+        ("volume_mm3:500.0", "volume_mm3:-5.0", "`settings.effects[0]`"),
+    ] {
+        assert!(text.contains(was), "{was} is not in {text}");
+        fs::write(&state, text.replacen(was, is, 1)).unwrap();
+        let refused =
+            SavedScene::read(&kept).unwrap().restore(other.world_mut(), &scenario, &kept).unwrap_err();
+        assert!(refused.to_string().contains(named), "{was}: {refused}");
+    }
+    // Nothing has come of that.
+    let world = other.world_mut();
+    let mut added = world.query_filtered::<(), With<AddedEmitter>>();
+    assert_eq!(added.iter(world).count(), 0);
 }
 
 #[test]

@@ -1,6 +1,9 @@
 //! Emitters that send nothing, since their effect cannot be had: they say so once.
 
-use bevy::asset::LoadState;
+use std::fmt;
+use std::sync::Arc;
+
+use bevy::asset::{AssetLoadError, LoadState};
 use bevy::prelude::*;
 
 use super::Emitter;
@@ -40,16 +43,33 @@ pub(super) fn tell_silent(
     }
 }
 
+/// Why an emitter will have no effect. Asked for in each frame, put into words once.
+enum Wrong<'a> {
+    /// It never had one.
+    NoEffect,
+    /// Its asset failed to load.
+    NotLoaded(&'a Emitter, Arc<AssetLoadError>),
+}
+
+impl fmt::Display for Wrong<'_> {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoEffect => write!(to, "it has no effect"),
+            Self::NotLoaded(emitter, error) => match emitter.effect.path() {
+                Some(path) => write!(to, "its effect `{path}` cannot be loaded: {error}"),
+                None => write!(to, "its effect cannot be loaded: {error}"),
+            },
+        }
+    }
+}
+
 /// Of an emitter without an effect: why there will be none. Nothing while it may still come.
-fn what_is_wrong(emitter: &Emitter, server: Option<&AssetServer>) -> Option<String> {
+fn what_is_wrong<'a>(emitter: &'a Emitter, server: Option<&AssetServer>) -> Option<Wrong<'a>> {
     if emitter.effect == Handle::default() {
-        return emitter.enabled.then(|| "it has no effect".to_owned());
+        return emitter.enabled.then_some(Wrong::NoEffect);
     }
     match server?.get_load_state(&emitter.effect)? {
-        LoadState::Failed(error) => {
-            let path = emitter.effect.path().map(ToString::to_string).unwrap_or_default();
-            Some(format!("its effect `{path}` cannot be loaded: {error}"))
-        }
+        LoadState::Failed(error) => Some(Wrong::NotLoaded(emitter, error)),
         _ => None,
     }
 }
@@ -85,5 +105,26 @@ mod tests {
         let effect = Handle::Uuid(bevy::asset::uuid::Uuid::from_u128(7), std::marker::PhantomData);
         let emitter = world.spawn(Emitter { effect, ..default() }).id();
         assert_eq!(told(&mut world, emitter), None);
+    }
+
+    #[test]
+    fn what_is_told_already_is_not_told_again_however_many_frames_go_by() {
+        let mut world = World::new();
+        world.init_resource::<EffectTable>();
+        let emitter = world.spawn(Emitter::default()).id();
+        assert!(told(&mut world, emitter).is_some());
+        world.clear_trackers();
+        assert!(told(&mut world, emitter).is_some());
+        let again = world.entity(emitter).get_ref::<NotEmitting>().map(|told| told.is_changed());
+        assert_eq!(again, Some(false));
+    }
+
+    #[test]
+    fn reasons_are_put_into_words_when_they_are_told() {
+        let emitter = Emitter::default();
+        assert!(matches!(what_is_wrong(&emitter, None), Some(Wrong::NoEffect)));
+        assert_eq!(Wrong::NoEffect.to_string(), "it has no effect");
+        let failed = Wrong::NotLoaded(&emitter, Arc::new(AssetLoadError::AssetMetaReadError));
+        assert!(failed.to_string().starts_with("its effect cannot be loaded: "), "{failed}");
     }
 }

@@ -5,14 +5,14 @@ use std::sync::Arc;
 use bevy::ecs::entity::EntityHashMap;
 use bevy::math::Affine3A;
 use bevy::prelude::*;
-use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+use bevy::tasks::{AsyncComputeTaskPool, Task};
 use bytemuck::{Pod, Zeroable};
 
 use super::kernel::{cross_axes, unpack_axis};
 use super::{MapSize, StampSpace, TILE_SIZE, Weatherable, Wrap};
 use crate::collision::{BoxOverlaps, MeshTriangles, SurfaceCollider};
 use crate::effect::{EffectTable, WeatherEffect};
-use crate::wetting::{TexelGeometry, TexelLayout, WetGeometry, surface_points};
+use crate::wetting::{MeasureTimer, TexelGeometry, TexelLayout, WetGeometry, surface_points};
 
 /// A texel's place, in whole numbers. A row of the GPU's frame buffer: `TexelFrame` in `shaders/splat.wgsl` has the same
 /// fields. Zero where nothing lies.
@@ -172,7 +172,16 @@ fn tile_boxes(texels: &[TexelFrame], size: u32) -> (Vec<u32>, Vec<(Vec3, Vec3)>)
 /// What is being measured.
 #[derive(Resource, Default)]
 pub(crate) struct FramesWork {
-    tasks: EntityHashMap<(Arc<TexelLayout>, Task<Frames>)>,
+    tasks: EntityHashMap<Measuring>,
+}
+
+/// A surface that is being measured.
+struct Measuring {
+    /// Of its texels when it was asked for.
+    layout: Arc<TexelLayout>,
+    task: Option<Task<Frames>>,
+    /// The tick in which it was.
+    asked_at: u32,
 }
 
 type Measurable = (
@@ -190,16 +199,18 @@ impl FramesWork {
     }
 }
 
-/// Measures the surfaces that are stamped on where they are, once there is an effect that paints.
+/// Measures the surfaces that are stamped on where they are, once there is an effect that paints. Where marks come depends on it, so
+/// it counts from the tick on that [`MeasureTiming`](crate::wetting::MeasureTiming) says.
 pub(super) fn measure_frames(
     mut commands: Commands,
     effects: Res<EffectTable>,
+    timer: MeasureTimer,
     mut work: ResMut<FramesWork>,
     surfaces: Query<Measurable>,
 ) {
     let work = work.bypass_change_detection();
-    work.tasks.retain(|entity, (layout, task)| {
-        let Some(frames) = check_ready(task) else { return true };
+    work.tasks.retain(|entity, Measuring { layout, task, asked_at }| {
+        let Some(frames) = timer.take(task, *asked_at) else { return true };
         // What was another shape in the meantime is measured again.
         if surfaces.get(*entity).is_ok_and(|(_, _, current, ..)| Arc::ptr_eq(current.0.layout(), layout)) {
             let measured = SurfaceFrames(Arc::new(frames), layout.clone());
@@ -221,7 +232,8 @@ pub(super) fn measure_frames(
         let (bvh, wrap) = (collider.0.clone(), surface.wrap());
         let of = geometry.0.clone();
         let task = AsyncComputeTaskPool::get().spawn(async move { Frames::new(bvh.triangles(), &of, wrap) });
-        work.tasks.insert(entity, (layout.clone(), task));
+        let measuring = Measuring { layout: layout.clone(), task: Some(task), asked_at: timer.tick() };
+        work.tasks.insert(entity, measuring);
     }
 }
 
@@ -233,6 +245,9 @@ pub(super) fn release_frames(removed: On<Remove, MapSize>, mut commands: Command
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::clock::WeatheringClock;
+    use crate::collision::MeshBvh;
+    use crate::wetting::MeasureTiming;
 
     fn frames(mesh: Mesh, size: u32) -> Frames {
         let triangles = MeshTriangles::from_mesh(&mesh).unwrap();
@@ -268,5 +283,58 @@ mod tests {
         assert_eq!(near(Vec3::new(-0.5, 0.0, -0.9), 2000), [0, 1]);
         assert_eq!(near(Vec3::ZERO, 66_000).len(), 16);
         assert!(near(Vec3::Y * 0.5, 2000).is_empty());
+    }
+
+    /// A surface that is measured for an effect that paints, asked for at tick 100.
+    fn measured_from(timing: MeasureTiming) -> (World, Entity) {
+        AsyncComputeTaskPool::get_or_init(Default::default);
+        let mut world = World::new();
+        world.init_resource::<FramesWork>();
+        world.insert_resource(timing);
+        world.insert_resource(WeatheringClock::new(60));
+        let mut effects = EffectTable::default();
+        let paint = WeatherEffect { bump: 0.5, stamp_radius: Some(0.02), ..default() };
+        effects.insert(Handle::default(), paint);
+        world.insert_resource(effects);
+        let surface = Weatherable::default();
+        let mesh: Mesh = Plane3d::new(Vec3::Y, Vec2::ONE).into();
+        let triangles = MeshTriangles::from_mesh(&mesh).unwrap();
+        let geometry = TexelGeometry::new(&triangles, &Affine3A::IDENTITY, Vec3::Y, 32, surface.wrap());
+        let collider = SurfaceCollider(Arc::new(MeshBvh::build(triangles)));
+        let entity = world.spawn((surface, WetGeometry(Arc::new(geometry)), collider)).id();
+        assert!(!is_measured_at(&mut world, entity, 100));
+        (world, entity)
+    }
+
+    /// Whether it has frames once a tick has begun.
+    fn is_measured_at(world: &mut World, surface: Entity, tick: u32) -> bool {
+        world.resource_mut::<WeatheringClock>().go_to(tick);
+        let mut schedule = Schedule::default();
+        schedule.add_systems(measure_frames);
+        schedule.run(world);
+        world.get::<SurfaceFrames>(surface).is_some()
+    }
+
+    #[test]
+    fn marks_know_where_they_lie_from_a_fixed_tick_on_where_runs_have_to_be_alike() {
+        let (mut world, surface) = measured_from(MeasureTiming::AfterTicks(15));
+        // However early it is ready.
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        assert!(!is_measured_at(&mut world, surface, 114));
+        assert!(world.resource::<FramesWork>().is_busy());
+        // However late: it is waited for.
+        assert!(is_measured_at(&mut world, surface, 115));
+        assert!(!world.resource::<FramesWork>().is_busy());
+        let (mut world, surface) = measured_from(MeasureTiming::AfterTicks(15));
+        assert!(is_measured_at(&mut world, surface, 115));
+    }
+
+    #[test]
+    fn elsewhere_they_know_it_as_soon_as_it_is_known() {
+        let (mut world, surface) = measured_from(MeasureTiming::WhenReady);
+        let begun = std::time::Instant::now();
+        while !is_measured_at(&mut world, surface, 100) {
+            assert!(begun.elapsed().as_secs() < 30, "never ready");
+        }
     }
 }

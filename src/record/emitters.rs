@@ -5,6 +5,7 @@
 //! which it is not there yet, or no more, nothing that is done to it counts, and [`Recording::has_emitter`] says so. A branch from
 //! before its time knows nothing of it; the file of its effect stays, since the file of the old branch names it.
 
+use std::ops::Range;
 use std::path::Path;
 
 use bevy::prelude::*;
@@ -49,6 +50,12 @@ impl Recording {
     /// Whether an emitter of the session is there at this time: was added, if it was not from the start, and not removed.
     pub fn has_emitter(&self, emitter: Entity) -> bool {
         self.watched.emitter(emitter).is_some_and(|watched| watched.is_there(self.tick))
+    }
+
+    /// The ticks in which an emitter of the session is there: from that in which it was added, 0 if it was from the start, to before
+    /// that in which it was removed, [`u32::MAX`] if it was not. None for an emitter that is not the session's.
+    pub fn ticks_of(&self, emitter: Entity) -> Option<Range<u32>> {
+        self.watched.emitter(emitter).map(WatchedEmitter::ticks)
     }
 
     fn want(&mut self, change: Change) {
@@ -165,9 +172,14 @@ pub(super) fn free_file(folder: &Path, emitter: &str) -> String {
 }
 
 impl WatchedEmitter {
+    /// The ticks by whose ends it has been added and not removed.
+    fn ticks(&self) -> Range<u32> {
+        self.since..self.gone.unwrap_or(u32::MAX)
+    }
+
     /// Whether it has been added and not removed by the end of a tick.
     pub(super) fn is_there(&self, tick: u32) -> bool {
-        self.since <= tick && self.gone.is_none_or(|gone| gone > tick)
+        self.ticks().contains(&tick)
     }
 }
 

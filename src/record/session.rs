@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use bevy::prelude::*;
 
 use super::RecordError;
-use super::actions::{Recorded, all_events};
+use super::actions::{Recorded, all_events, new_events};
 use super::emitters::Change;
 use super::file::{text_of, write};
 use super::history::History;
@@ -17,7 +17,8 @@ use crate::emitter::EmissionDetail;
 use crate::save::SavedScene;
 use crate::scenario::{
     Action, BrushEvent, EventSpec, LoadedScenario, Scenario, ScenarioStatus, ScenarioSurface, WeatherChange,
-    beginning_of, check_weather, exchange_events, scene_digest, tick_from, weather_is_changing,
+    append_events, beginning_of, check_weather, exchange_events, scene_digest, tick_from,
+    weather_is_changing,
 };
 use crate::weather::Weather;
 
@@ -43,6 +44,8 @@ pub struct Recording {
     pub(super) base: Vec<EventSpec>,
     /// In order of their ticks.
     pub(super) actions: Vec<Recorded>,
+    /// Some of them are no more, and their events still are.
+    is_stale: bool,
     /// Waiting for the next tick; added by the app.
     others: Vec<Action>,
     /// Emitters that come or go in the next tick.
@@ -217,7 +220,7 @@ impl Recording {
         let mut actions = Vec::new();
         self.watched.take_actions(tick, self.hz(), &mut actions);
         if let Some(change) = self.watched.take_weather() {
-            match self.refusal_of(&change, tick) {
+            match self.refusal_of(world, &change, tick) {
                 None => actions.push(Action::Weather(change)),
                 Some(note) => self.add_note(note),
             }
@@ -242,8 +245,8 @@ impl Recording {
     }
 
     /// Why the weather cannot change so.
-    fn refusal_of(&self, change: &WeatherChange, tick: u32) -> Option<String> {
-        if weather_is_changing(&self.loaded.scenario, tick) {
+    fn refusal_of(&self, world: &World, change: &WeatherChange, tick: u32) -> Option<String> {
+        if weather_is_changing(world, tick) {
             return Some("the scenario is changing the weather just now".into());
         }
         let was = self.watched.weather();
@@ -261,7 +264,7 @@ impl Recording {
     /// Lets things happen in a tick, and from then on be recorded.
     fn record(&mut self, world: &mut World, tick: u32, actions: Vec<Action>) {
         let at = beginning_of(tick, self.hz());
-        let mut is_past = tick <= self.end;
+        let (mut is_past, mut count) = (tick <= self.end, 0);
         for what in actions {
             let event = EventSpec { at, what };
             if let Err(error) = self.loaded.validate_new_event("events[_]", &event) {
@@ -280,14 +283,31 @@ impl Recording {
             let is_stroke = matches!(event.what, Action::Brush(_));
             let stroke = if is_stroke { self.stroke.max(1) } else { 0 };
             self.actions.push(Recorded { tick, what: event.what, stroke });
+            count += 1;
         }
-        self.update_events(world);
+        if !self.add_events(world, count) {
+            self.update_events(world);
+        }
+    }
+
+    /// Lets the last so many actions happen, too; `false` if all events have to be worked out anew.
+    fn add_events(&mut self, world: &mut World, count: usize) -> bool {
+        let (before, new) = self.actions.split_at(self.actions.len() - count);
+        let events = new_events(&self.base, before, new, self.hz()).filter(|_| !self.is_stale);
+        match events {
+            Some(events) if append_events(world, &self.loaded.scenario, &events) => {
+                self.loaded.scenario.events.extend(events);
+                true
+            }
+            _ => false,
+        }
     }
 
     /// Lets what was done, and nothing else, happen from here on.
     pub(super) fn update_events(&mut self, world: &mut World) {
         self.loaded.scenario.events = all_events(&self.base, &self.actions, self.hz());
         exchange_events(world, &self.loaded.scenario);
+        self.is_stale = false;
     }
 
     /// What was done in this tick or later is no more; it is written into a file of its own.
@@ -302,6 +322,7 @@ impl Recording {
             });
         }
         self.actions.truncate(kept);
+        self.is_stale = true;
         self.flaws.retain(|(at, _)| *at < tick);
         self.history.forget_after(tick.saturating_sub(1));
         self.forget_emitters(world, tick);
@@ -350,6 +371,7 @@ pub fn begin(world: &mut World, base: LoadedScenario) {
         base: base.scenario.events.clone(),
         loaded: base,
         actions: Vec::new(),
+        is_stale: false,
         others: Vec::new(),
         changes: Vec::new(),
         stroke: 0,

@@ -337,6 +337,7 @@ mod tests {
             particles: vec![],
             waiting: vec![],
             surfaces: vec![],
+            settings: None,
         };
         SavedScene { state, surfaces: vec![] }
     }

@@ -7,7 +7,7 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `state.ron` | version, time, weather, emitters, particles in flight, accounts; materials, if they were [asked for](SavedScene::with_materials) |
+//! | `state.ron` | version, time, weather, emitters, particles in flight, accounts; [materials](SavedScene::with_materials) and [what emitters are](SavedScene::with_emitters), if they were asked for |
 //! | `<surface>_film.png`, `_pores.png`, `_since.png` | a texel's words, the lowest byte in red, the highest in alpha |
 //! | `<surface>_look.png` | how wet it looked, reserve, how much of its film was seen, nearness to a rim |
 //! | `<surface>_efflorescence.png`, `_tide.png` | bits of `f32`, as above; if the material leaves marks |
@@ -16,6 +16,7 @@
 //!
 //! Not kept: rings of drops, which live for less than a second.
 
+mod emitters;
 mod error;
 mod leftovers;
 mod maps;
@@ -36,6 +37,8 @@ use crate::scenario::{Digest, LoadedScenario, ScenarioSurface};
 use crate::weather::{DryingClock, DryingPoint, Weather};
 use crate::wetting::{Ledger, SurfaceWater};
 
+use emitters::EmitterSettings;
+pub use emitters::{AddedEmitter, RemovedEmitter};
 pub use error::SaveError;
 pub use maps::ColorMaps;
 
@@ -74,6 +77,9 @@ pub(super) struct SceneState {
     /// To be born in the next tick.
     pub(super) waiting: Vec<SavedParticle>,
     pub(super) surfaces: Vec<SurfaceState>,
+    /// What emitters are set to, and those that were added; left out where that is for the scenario to say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) settings: Option<EmitterSettings>,
 }
 
 /// What `state.ron` says of a surface.
@@ -190,6 +196,7 @@ impl SavedScene {
             particles,
             waiting: new.waiting().iter().copied().map(SavedParticle::from).collect(),
             surfaces: states,
+            settings: None,
         };
         Self { state, surfaces }
     }
@@ -205,6 +212,33 @@ impl SavedScene {
             state.materials = Some((porous, water));
         }
         self
+    }
+
+    /// Keeps what emitters are set to, too, as it is now: where somebody has put them, whether they are in
+    /// [somebody's hand](crate::scenario::ByHand), [removed](RemovedEmitter) or [added](AddedEmitter), and effects that are none of the
+    /// scenario's. A scenario says that itself, and when it changes; this is for apps in which somebody may have changed it. Right
+    /// after [`Self::capture`].
+    ///
+    /// # Errors
+    /// [`SaveError`] for an effect that is none of the scenario's and is not loaded, or names pictures.
+    pub fn with_emitters(mut self, world: &mut World) -> Result<Self, SaveError> {
+        emitters::take(world, &mut self.state)?;
+        Ok(self)
+    }
+
+    /// Whether it says what emitters are set to, and has those that were added.
+    pub fn has_emitters(&self) -> bool {
+        self.state.settings.is_some()
+    }
+
+    /// Keeps what another scene has kept, which this world has gone on from.
+    ///
+    /// # Errors
+    /// As [`Self::with_emitters`].
+    pub(crate) fn with_all_of(self, world: &mut World, other: &Self) -> Result<Self, SaveError> {
+        let has_materials = other.state.surfaces.iter().any(|surface| surface.materials.is_some());
+        let scene = if has_materials { self.with_materials(world) } else { self };
+        if other.has_emitters() { scene.with_emitters(world) } else { Ok(scene) }
     }
 
     /// That a scene can be saved into this folder: better before a long run than after it. Makes the folder that it lies

@@ -7,7 +7,7 @@ use bevy::prelude::*;
 use bevy::render::storage::ShaderBuffer;
 
 use super::maps::value;
-use super::{SaveError, SavedScene, emitters_in_order, surfaces_in_order};
+use super::{AddedEmitter, SaveError, SavedScene, emitters, emitters_in_order, surfaces_in_order};
 use crate::clock::WeatheringClock;
 use crate::effect::EffectTable;
 use crate::emitter::{EmissionSeed, EmitterState, NewParticles};
@@ -16,13 +16,14 @@ use crate::overlay::{
     CpuMaps, Lying, MapLoss, MapSize, Overlays, SurfaceFrames, SurfaceTotals, SurfaceTraces, Weatherable,
     mip_chain,
 };
-use crate::particle::{ParticleCounts, Particles};
+use crate::particle::{Particle, ParticleCounts, Particles, SavedParticle};
 use crate::scenario::{Digest, LoadedScenario, check_weather, rewind};
 use crate::weather::DryingClock;
 use crate::wetting::{SurfaceWater, put_matter};
 
 impl SavedScene {
-    /// Puts the state into a world whose scenario is ready and has run no tick. `folder` is for messages.
+    /// Puts the state into a world whose scenario is ready and has run no tick. `folder` is for messages. If it
+    /// [says](Self::has_emitters) what emitters are, those that have been [added](AddedEmitter) to the world make room for its own.
     ///
     /// # Errors
     /// [`SaveError::Value`] if it was saved from another `.ron` file, or makes no sense; then the world is as it was.
@@ -37,14 +38,13 @@ impl SavedScene {
             let expected = format!("{}, the hash of this scenario's .ron file", scenario.hash);
             return Err(value(&path, "scenario", &state.scenario, expected));
         }
-        let emitters = emitters_in_order(world);
-        if emitters.len() != state.emitters.len() {
-            return Err(value(
-                &path,
-                "emitters",
-                state.emitters.len(),
-                format!("{} of them", emitters.len()),
-            ));
+        let mut there = emitters_in_order(world);
+        let mut settings = None;
+        if let Some(kept) = &state.settings {
+            there.retain(|emitter| world.get::<AddedEmitter>(*emitter).is_none());
+            settings = Some((kept, kept.check(world, (there.len(), state.emitters.len()), &path)?));
+        } else if there.len() != state.emitters.len() {
+            return Err(value(&path, "emitters", state.emitters.len(), format!("{} of them", there.len())));
         }
         let surfaces = surfaces_in_order(world);
         let names: Vec<&str> = surfaces.iter().map(|(_, name)| name.as_str()).collect();
@@ -87,7 +87,8 @@ impl SavedScene {
             let expected = "in order of ticks, none in the future, and finite".into();
             return Err(value(&path, "drying", "out of order", expected));
         };
-        let effects = world.resource::<EffectTable>().rows().len();
+        let rows = world.resource::<EffectTable>().rows().len();
+        let effects = settings.as_ref().map_or(rows, |(_, (_, numbers))| *numbers);
         let saved = state.particles.iter().chain(&state.waiting);
         if let Some(effect) =
             saved.map(|particle| usize::from(particle.effect)).find(|&effect| effect >= effects)
@@ -117,15 +118,17 @@ impl SavedScene {
         world.insert_resource(Digest(state.digest));
         world.insert_resource(EmissionSeed(state.seed));
         world.resource_mut::<WeatheringClock>().go_to(state.tick);
-        for (entity, emitter) in emitters.into_iter().zip(&state.emitters) {
+        let rows = settings.map(|(kept, (effects, _))| kept.restore(world, effects));
+        for (entity, emitter) in emitters_in_order(world).into_iter().zip(&state.emitters) {
             if let Some(mut state) = world.get_mut::<EmitterState>(entity) {
                 *state = emitter.clone();
             }
         }
         let mut particles = world.resource_mut::<Particles>();
         particles.clear();
-        particles.spawn(state.particles.iter().map(|&saved| saved.into()));
-        let waiting = state.waiting.iter().map(|&saved| saved.into()).collect();
+        let in_world = |&saved: &SavedParticle| Particle::from(emitters::with_row(saved, rows.as_deref()));
+        particles.spawn(state.particles.iter().map(in_world));
+        let waiting = state.waiting.iter().map(in_world).collect();
         world.resource_mut::<NewParticles>().restore(waiting, state.next_sequence);
         for (index, (entity, _)) in surfaces.into_iter().enumerate() {
             if let Some((porous, water)) = state.surfaces[index].materials {

@@ -52,14 +52,14 @@ pub use schema::{
     MaterialSpec, MeshSpec, Scenario, ScenarioPart, SceneSpec, SunSpec, SurfaceSpec, SurfaceTextureSpec,
     TextureSpec, WeatherPart, WeatherSpec, WetMapSpec,
 };
-pub(crate) use spawn::spawn_emitter;
 pub use spawn::{AssetTree, ScenarioPlugin, ScenarioStatus, ScenarioSurface, SceneEntity};
+pub(crate) use spawn::{OwnEffect, spawn_emitter};
 pub use switch::{PreparedScenario, switch_scenario};
 pub use timeline::{
     Action, BrushEvent, CameraMove, EmitterAdjustment, EmitterMove, EventSpec, Expectation,
     ExpectationOutcome, Expectations, MaterialChange, Quantity, WeatherChange,
 };
 pub(crate) use timeline::{
-    beginning_of, captures, exchange_events, exports, rewind, tick_from, weather_is_changing,
+    append_events, beginning_of, captures, exchange_events, exports, rewind, tick_from, weather_is_changing,
 };
 pub(crate) use validate::check_weather;

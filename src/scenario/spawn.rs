@@ -69,6 +69,10 @@ pub(super) struct CurrentScenario(pub(super) LoadedScenario);
 #[derive(Component, Debug, Default, Clone, Copy)]
 pub struct SceneEntity;
 
+/// The effect that an emitter of the scenario has by its file, whatever it sends out now.
+#[derive(Component, Debug, Clone)]
+pub(crate) struct OwnEffect(pub(crate) Handle<WeatherEffect>);
+
 /// The folder that the app's asset server reads from, where it may be another than the scenario's tree: then files of the
 /// scenario are loaded by absolute paths, which the asset server must allow. If it is the same, and the asset server watches it,
 /// effects follow their files.
@@ -229,7 +233,7 @@ pub(crate) fn spawn_emitter(
     let handle = world.resource_mut::<Assets<WeatherEffect>>().add(effect.clone());
     world.resource_mut::<EffectTable>().insert(handle.clone(), effect);
     let emitter = Emitter {
-        effect: handle,
+        effect: handle.clone(),
         rate: spec.rate,
         shape: spec.shape,
         flow: spec.flow,
@@ -239,7 +243,7 @@ pub(crate) fn spawn_emitter(
         stream: index as u32,
         enabled: false,
     };
-    let named = (SceneEntity, Name::new(spec.name.clone()));
+    let named = (SceneEntity, Name::new(spec.name.clone()), OwnEffect(handle));
     Some(world.spawn((named, emitter, emitter_motion(scenario, spec))).id())
 }
 

@@ -63,6 +63,9 @@ fn emitters_that_come_and_go_replay_to_the_same_digest() {
     let tap = session.emitter("tap");
     session.world().resource_mut::<Recording>().remove_emitter(tap);
     session.run(48);
+    let recording = session.world().resource::<Recording>();
+    let ticks = [spray, tap].map(|emitter| recording.ticks_of(emitter));
+    assert_eq!(ticks, [Some(111..172), Some(0..173)]);
     let digest = session.digest();
     let file = session.save();
     assert_eq!(replayed(&file), digest);

@@ -47,8 +47,10 @@ impl LoadedScenario {
         let is_before = |other: &EventSpec| {
             other.at <= event.at && matches!(&other.what, Action::Adjust(old) if old.emitter == new.emitter)
         };
-        let before = in_order(&self.scenario).into_iter().filter(|&(_, other)| is_before(other));
-        let named = before.map(|(index, other)| (format!("events[{index}]"), other));
+        let events = self.scenario.events.iter().enumerate();
+        let mut before: Vec<_> = events.filter(|&(_, other)| is_before(other)).collect();
+        before.sort_by(|(_, a), (_, b)| a.at.total_cmp(&b.at));
+        let named = before.into_iter().map(|(index, other)| (format!("events[{index}]"), other));
         self.validate_adjustments(named.chain([(field.to_owned(), event)]))
     }
 

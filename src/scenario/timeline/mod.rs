@@ -8,6 +8,7 @@
 //! An event at second `at` acts in the first tick that begins then or later, as an emitter's `start` does; what only looks
 //! sees the end of the first tick that ends then or later. So an expectation sees nothing of what happens at its own time.
 
+mod append;
 mod apply;
 mod check;
 mod events;
@@ -24,6 +25,7 @@ pub use events::{
 };
 pub use expect::{ExpectationOutcome, Expectations};
 
+pub(crate) use append::append_events;
 pub(super) use apply::{MaterialHandles, apply_events_plugin, insert_events};
 pub(crate) use apply::{exchange_events, rewind};
 
@@ -60,9 +62,9 @@ fn in_order(scenario: &Scenario) -> Vec<(usize, &EventSpec)> {
     events
 }
 
-/// Whether the weather is on its way from one state to another in a tick.
-pub(crate) fn weather_is_changing(scenario: &Scenario, tick: u32) -> bool {
-    let changes = Timeline::new(scenario).changes;
+/// Whether the weather is on its way from one state to another in a tick of the scenario that runs.
+pub(crate) fn weather_is_changing(world: &World, tick: u32) -> bool {
+    let changes = world.get_resource::<Timeline>().map_or(&[][..], |timeline| &timeline.changes[..]);
     changes.iter().any(|step| step.last > step.first && (step.first..=step.last).contains(&tick))
 }
 
@@ -106,19 +108,27 @@ fn named<'a>(
 
 /// When an emitter works and where it is, with what events say of it.
 pub(super) fn emitter_motion(scenario: &Scenario, spec: &EmitterSpec) -> EmitterMotion {
-    let hz = scenario.tick_hz;
-    let (mut legs, mut switches) = (Vec::new(), Vec::new());
-    for (_, EventSpec { at, what }) in in_order(scenario) {
+    let (keys, stop) = (spec.keys.clone(), spec.stop.unwrap_or(scenario.seconds));
+    let mut motion = EmitterMotion { keys, legs: Vec::new(), start: spec.start, stop, switches: Vec::new() };
+    for (_, event) in in_order(scenario) {
+        motion.add(&spec.name, event, scenario.tick_hz);
+    }
+    motion
+}
+
+impl EmitterMotion {
+    /// Adds an event behind all others, if it is about the emitter of this name.
+    fn add(&mut self, emitter: &str, EventSpec { at, what }: &EventSpec, hz: u32) {
         match what {
-            Action::Start(name) if *name == spec.name => switches.push((tick_from(*at, hz), true)),
-            Action::Stop(name) if *name == spec.name => switches.push((tick_from(*at, hz), false)),
-            Action::Move(step) if step.emitter == spec.name => {
+            Action::Start(name) if name == emitter => self.switches.push((tick_from(*at, hz), true)),
+            Action::Stop(name) if name == emitter => self.switches.push((tick_from(*at, hz), false)),
+            Action::Move(step) if step.emitter == emitter => {
                 let t = *at as f32;
                 // A move that is under way ends here; what was before is not touched.
-                let Some((position, target)) = pose(&spec.keys, &legs, t) else { continue };
+                let Some((position, target)) = pose(&self.keys, &self.legs, t) else { return };
                 // What is at once is done by the end of the first tick that begins then, and not before.
                 let arrives = t + step.over.max(0.5 / hz as f32);
-                legs.push(Leg {
+                self.legs.push(Leg {
                     from: EmitterKey { t, position, target },
                     to: EmitterKey { t: arrives, position: step.position, target: step.target },
                 });
@@ -126,8 +136,6 @@ pub(super) fn emitter_motion(scenario: &Scenario, spec: &EmitterSpec) -> Emitter
             _ => {}
         }
     }
-    let stop = spec.stop.unwrap_or(scenario.seconds);
-    EmitterMotion { keys: spec.keys.clone(), legs, start: spec.start, stop, switches }
 }
 
 #[cfg(test)]

@@ -103,33 +103,43 @@ impl WeatherStep {
 impl Timeline {
     /// What happens in a scenario that has been checked.
     pub(super) fn new(scenario: &Scenario) -> Self {
-        let hz = scenario.tick_hz;
         let mut timeline = Self { weather: scenario.weather(), ..default() };
-        let mut weather = timeline.weather;
-        for (_, EventSpec { at, what }) in in_order(scenario) {
-            let tick = tick_from(*at, hz);
-            if what.acts() {
-                timeline.acts.push((tick, hash(what)));
-            }
-            match what {
-                Action::Weather(change) => {
-                    let step = WeatherStep::new(change, weather, tick, hz);
-                    weather = step.to;
-                    timeline.changes.push(step);
-                }
-                Action::Brush(event) => {
-                    let surface = event.surface.as_deref().and_then(|name| scenario.surface_number(name));
-                    timeline.strokes.push(BrushStep { tick, brush: event.brush(), surface });
-                }
-                Action::Material(change) => timeline.add_material(scenario, change, tick),
-                Action::Adjust(adjustment) => timeline.add_adjustment(scenario, adjustment, tick),
-                _ => {}
-            }
+        for (_, event) in in_order(scenario) {
+            timeline.add(scenario, event);
         }
-        // What surfaces and emitters are at first was put in when they first changed.
-        timeline.materials.sort_by_key(|step| step.tick);
-        timeline.emitters.sort_by_key(|step| step.tick);
+        timeline.sort();
         timeline
+    }
+
+    /// Adds an event behind all others that change what it changes. Then the lists have to be sorted.
+    pub(super) fn add(&mut self, scenario: &Scenario, EventSpec { at, what }: &EventSpec) {
+        let hz = scenario.tick_hz;
+        let tick = tick_from(*at, hz);
+        if what.acts() {
+            self.acts.push((tick, hash(what)));
+        }
+        match what {
+            Action::Weather(change) => {
+                let weather = self.changes.last().map_or(self.weather, |step| step.to);
+                self.changes.push(WeatherStep::new(change, weather, tick, hz));
+            }
+            Action::Brush(event) => {
+                let surface = event.surface.as_deref().and_then(|name| scenario.surface_number(name));
+                self.strokes.push(BrushStep { tick, brush: event.brush(), surface });
+            }
+            Action::Material(change) => self.add_material(scenario, change, tick),
+            Action::Adjust(adjustment) => self.add_adjustment(scenario, adjustment, tick),
+            _ => {}
+        }
+    }
+
+    /// Puts the lists in order of ticks; what is of the same one stays as it came. Weather is in order always.
+    pub(super) fn sort(&mut self) {
+        // What surfaces and emitters are at first was put in when they first changed.
+        self.materials.sort_by_key(|step| step.tick);
+        self.emitters.sort_by_key(|step| step.tick);
+        self.strokes.sort_by_key(|step| step.tick);
+        self.acts.sort_by_key(|(tick, _)| *tick);
     }
 
     fn add_material(&mut self, scenario: &Scenario, change: &MaterialChange, tick: u32) {

@@ -2,14 +2,18 @@
 //!
 //! One that is added is the sandbox's own, until a recording begins: then it becomes one of the recorded scenario, and what is added
 //! or removed from then on is recorded. One of the scenario that is removed stays in the world, switched off, since what is saved
-//! has all of them.
+//! has all of them. Of a session whose recording has ended, each is there in its own time ([`Stay`]).
+
+use std::ops::Range;
 
 use bevy::prelude::*;
 use bevy_egui::egui;
+use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::collision::{CollisionScene, SceneHit};
 use bevy_weathering::effect::WeatherEffect;
 use bevy_weathering::emitter::{Emitter, EmitterShape};
 use bevy_weathering::record::{ExtraEmitter, Recording};
+use bevy_weathering::save::{AddedEmitter, RemovedEmitter};
 use bevy_weathering::scenario::{ByHand, EmitterKey, EmitterSpec, SceneEntity};
 
 use super::camera::View;
@@ -22,16 +26,16 @@ const STREAMS: u32 = 1 << 29;
 /// Metres from an emitter to what it aims at, where that is not known.
 const AIM: f32 = 4.0;
 
-/// An emitter of the sandbox's own. It goes with the scene.
-#[derive(Component, Clone, Copy, PartialEq, Eq)]
-#[require(SceneEntity)]
-pub struct Added;
+/// The ticks in which an emitter of a session is there whose recording has ended. In others the session's events have it switched
+/// off.
+#[derive(Component, Debug, Clone, PartialEq, Eq)]
+pub struct Stay(Range<u32>);
 
-/// An emitter of the scenario that was removed.
-#[derive(Component, Clone, Copy)]
-pub struct Removed {
-    was_on: bool,
-    was_by_hand: bool,
+impl Stay {
+    /// Whether its time has not come yet.
+    pub fn is_to_come(&self, tick: u32) -> bool {
+        tick < self.0.start
+    }
 }
 
 /// What is added, and where.
@@ -57,16 +61,57 @@ pub enum Done {
     /// It had been added, and was removed.
     Gone(Box<(Name, Emitter, Transform)>),
     /// It is the scenario's, and was removed.
-    Removed(Entity),
+    Removed(Removed),
+}
+
+/// An emitter of the scenario before it was removed.
+pub struct Removed {
+    emitter: Entity,
+    was_on: bool,
+    was_by_hand: bool,
+    stay: Option<Stay>,
 }
 
 pub fn plugin(app: &mut App) {
-    app.insert_resource(Choice { effect: "hose".into(), place: Spot::LookedAt });
+    app.insert_resource(Choice { effect: "hose".into(), place: Spot::LookedAt })
+        // Before panels show who is there.
+        .add_systems(PreUpdate, follow_stays);
 }
 
 /// Whether there is an emitter that is no part of the scenario.
 pub fn is_any(world: &mut World) -> bool {
-    world.query_filtered::<(), With<Added>>().iter(world).next().is_some()
+    world.query_filtered::<(), With<AddedEmitter>>().iter(world).next().is_some()
+}
+
+/// A recording is about to end: emitters that were not there all the time stay in their own.
+pub fn keep_stays(world: &mut World) {
+    let mut emitters = world.query_filtered::<Entity, (With<Emitter>, With<SceneEntity>)>();
+    let Some(recording) = world.get_resource::<Recording>() else { return };
+    let stay = |emitter: Entity| Some((emitter, Stay(recording.ticks_of(emitter)?)));
+    let stays: Vec<_> = emitters.iter(world).filter_map(stay).collect();
+    for (emitter, stay) in stays.into_iter().filter(|(_, stay)| stay.0 != (0..u32::MAX)) {
+        world.entity_mut(emitter).insert(stay);
+    }
+}
+
+/// Emitters whose time is over have been removed, until the scene is started over.
+fn follow_stays(
+    clock: Res<WeatheringClock>,
+    emitters: Query<(Entity, &Stay, Has<RemovedEmitter>, Has<ByHand>)>,
+    mut commands: Commands,
+) {
+    for (emitter, stay, is_removed, is_by_hand) in &emitters {
+        match (clock.tick() >= stay.0.end, is_removed) {
+            (false, true) => {
+                commands.entity(emitter).remove::<(RemovedEmitter, ByHand)>();
+            }
+            // What somebody has taken in hand is theirs.
+            (true, false) if !is_by_hand => {
+                commands.entity(emitter).insert(RemovedEmitter);
+            }
+            _ => {}
+        }
+    }
 }
 
 /// What to add, where, and the button.
@@ -118,7 +163,7 @@ fn add(world: &mut World, choice: &Choice) {
         record(world, &name, &emitter, &transform);
         return;
     }
-    let mut others = world.query::<(&Name, &Emitter, Has<Added>)>();
+    let mut others = world.query::<(&Name, &Emitter, Has<AddedEmitter>)>();
     let (mut names, mut stream) = (Vec::new(), STREAMS);
     for (name, other, is_added) in others.iter(world) {
         names.push(name.as_str().to_owned());
@@ -143,7 +188,7 @@ fn numbered(name: &str, is_taken: impl Fn(&str) -> bool) -> String {
 }
 
 fn spawn(world: &mut World, name: Name, emitter: Emitter, transform: Transform) {
-    world.spawn((Added, name, emitter, transform, GlobalTransform::from(transform)));
+    world.spawn((AddedEmitter, name, emitter, transform, GlobalTransform::from(transform)));
 }
 
 /// Before a place, so near that what comes out there hits it.
@@ -218,7 +263,7 @@ fn to_extra(
 /// # Errors
 /// What cannot be taken along.
 pub fn to_record(world: &mut World) -> Result<Vec<ExtraEmitter>, String> {
-    let mut added = world.query_filtered::<(&Emitter, &Name, &Transform), With<Added>>();
+    let mut added = world.query_filtered::<(&Emitter, &Name, &Transform), With<AddedEmitter>>();
     let world: &World = world;
     let mut order: Vec<_> = added.iter(world).collect();
     order.sort_by_key(|(emitter, ..)| emitter.stream);
@@ -244,16 +289,18 @@ pub fn remove(world: &mut World, emitter: Entity) {
     }
     let Ok(mut entity) = world.get_entity_mut(emitter) else { return };
     let Some(was) = entity.get::<Emitter>().cloned() else { return };
-    let done = if entity.contains::<Added>() {
+    let done = if entity.contains::<AddedEmitter>() {
         let name = entity.get::<Name>().cloned().unwrap_or_default();
         let transform = entity.get::<Transform>().copied().unwrap_or_default();
         entity.despawn();
         Done::Gone(Box::new((name, was, transform)))
     } else {
-        let removed = Removed { was_on: was.enabled, was_by_hand: entity.contains::<ByHand>() };
+        let (was_on, was_by_hand) = (was.enabled, entity.contains::<ByHand>());
+        // For good, whatever its time was.
+        let stay = entity.take::<Stay>();
         // Or its working hours would switch it on again.
-        entity.insert((removed, ByHand, Emitter { enabled: false, ..was }));
-        Done::Removed(emitter)
+        entity.insert((RemovedEmitter, ByHand, Emitter { enabled: false, ..was }));
+        Done::Removed(Removed { emitter, was_on, was_by_hand, stay })
     };
     world.resource_mut::<Undo>().keep_emitter(done);
 }
@@ -263,7 +310,7 @@ impl Done {
     pub fn take_back(self, world: &mut World) -> &'static str {
         match self {
             Self::Added(stream) => {
-                let mut added = world.query_filtered::<(Entity, &Emitter), With<Added>>();
+                let mut added = world.query_filtered::<(Entity, &Emitter), With<AddedEmitter>>();
                 let found = added.iter(world).find(|(_, emitter)| emitter.stream == stream);
                 if let Some(emitter) = found.map(|(emitter, _)| emitter) {
                     world.despawn(emitter);
@@ -275,14 +322,17 @@ impl Done {
                 spawn(world, name, emitter, transform);
                 "brought the emitter back"
             }
-            Self::Removed(emitter) => {
+            Self::Removed(Removed { emitter, was_on, was_by_hand, stay }) => {
                 let Ok(mut entity) = world.get_entity_mut(emitter) else { return "the emitter has gone" };
-                if let Some(Removed { was_on, was_by_hand }) = entity.take::<Removed>() {
+                if entity.take::<RemovedEmitter>().is_some() {
                     if let Some(mut emitter) = entity.get_mut::<Emitter>() {
                         emitter.enabled = was_on;
                     }
                     if !was_by_hand {
                         entity.remove::<ByHand>();
+                    }
+                    if let Some(stay) = stay {
+                        entity.insert(stay);
                     }
                 }
                 "brought the emitter back"
@@ -304,7 +354,7 @@ mod tests {
     }
 
     fn added(world: &mut World) -> Vec<(Entity, u32)> {
-        let mut added = world.query_filtered::<(Entity, &Emitter), With<Added>>();
+        let mut added = world.query_filtered::<(Entity, &Emitter), With<AddedEmitter>>();
         added.iter(world).map(|(entity, emitter)| (entity, emitter.stream)).collect()
     }
 
@@ -338,12 +388,45 @@ mod tests {
             }
             remove(&mut world, emitter);
             assert!(!world.get::<Emitter>(emitter).unwrap().enabled);
-            assert!(world.get::<ByHand>(emitter).is_some() && world.get::<Removed>(emitter).is_some());
+            assert!(world.get::<ByHand>(emitter).is_some() && world.get::<RemovedEmitter>(emitter).is_some());
             undo(&mut world);
             assert!(world.get::<Emitter>(emitter).unwrap().enabled);
-            assert!(world.get::<Removed>(emitter).is_none());
+            assert!(world.get::<RemovedEmitter>(emitter).is_none());
             assert_eq!(world.get::<ByHand>(emitter).is_some(), was_by_hand);
         }
+    }
+
+    /// Whether the panel has it after a tick.
+    fn is_there_at(world: &mut World, emitter: Entity, tick: u32) -> bool {
+        let mut clock = WeatheringClock::new(60);
+        (0..tick).for_each(|_| clock.advance());
+        world.insert_resource(clock);
+        let mut schedule = Schedule::default();
+        schedule.add_systems(follow_stays);
+        schedule.run(world);
+        world.get::<RemovedEmitter>(emitter).is_none()
+    }
+
+    #[test]
+    fn what_was_removed_in_a_session_stays_so_when_its_recording_has_ended() {
+        let mut world = world();
+        let emitter = world.spawn((SceneEntity, Emitter { enabled: false, ..default() }, Stay(10..50))).id();
+        let there = [60, 49, 9, 50].map(|tick| is_there_at(&mut world, emitter, tick));
+        assert_eq!(there, [false, true, true, false]);
+        let stay = world.get::<Stay>(emitter).unwrap();
+        assert!(stay.is_to_come(9) && !stay.is_to_come(10));
+        // Its events keep it off: nobody has taken it in hand.
+        assert!(world.get::<ByHand>(emitter).is_none());
+        // In its time it may be removed for good, and that be taken back.
+        assert!(is_there_at(&mut world, emitter, 30));
+        remove(&mut world, emitter);
+        assert!(!is_there_at(&mut world, emitter, 31) && !is_there_at(&mut world, emitter, 60));
+        undo(&mut world);
+        assert!(is_there_at(&mut world, emitter, 31) && !is_there_at(&mut world, emitter, 60));
+        // What is in somebody's hand does not go.
+        assert!(is_there_at(&mut world, emitter, 40));
+        world.entity_mut(emitter).insert(ByHand);
+        assert!(is_there_at(&mut world, emitter, 60));
     }
 
     #[test]

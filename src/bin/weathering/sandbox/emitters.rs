@@ -2,12 +2,14 @@
 
 use bevy::prelude::*;
 use bevy_egui::egui;
+use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::emitter::{Emitter, EmitterShape, EmitterState, Flow};
 use bevy_weathering::particle::{ParticleConfig, ParticleCounts};
 use bevy_weathering::record::Recording;
+use bevy_weathering::save::{AddedEmitter, RemovedEmitter};
 use bevy_weathering::scenario::{ByHand, SceneEntity};
 
-use super::added::{self, Added, Removed};
+use super::added::{self, Stay};
 use super::effects;
 use super::hose::InHand;
 use super::split::CopyOf;
@@ -20,7 +22,7 @@ pub fn plugin(app: &mut App) {
 }
 
 /// Those in the hand and over the scene have panels of their own.
-type Listed = (Without<InHand>, Without<OwnRain>, Without<CopyOf>, Without<Removed>);
+type Listed = (Without<InHand>, Without<OwnRain>, Without<CopyOf>, Without<RemovedEmitter>);
 
 fn show(ui: &mut egui::Ui, world: &mut World) {
     let counts = *world.resource::<ParticleCounts>();
@@ -33,12 +35,14 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
         ui.label(format!("{} not sent: others carry what they would", counts.merged));
     }
     added::show(ui, world);
-    let mut query = world.query_filtered::<(Entity, &Emitter, Option<&Name>), Listed>();
+    let mut query = world.query_filtered::<(Entity, &Emitter, Option<&Name>, Option<&Stay>), Listed>();
+    let tick = world.resource::<WeatheringClock>().tick();
     let recording = world.get_resource::<Recording>();
     let mut all: Vec<(u32, Entity, String)> = query
         .iter(world)
         .filter(|(entity, ..)| recording.is_none_or(|recording| recording.has_emitter(*entity)))
-        .map(|(entity, emitter, name)| {
+        .filter(|(.., stay)| stay.is_none_or(|stay| !stay.is_to_come(tick)))
+        .map(|(entity, emitter, name, _)| {
             (emitter.stream, entity, name.map_or_else(|| "emitter".to_owned(), ToString::to_string))
         })
         .collect();
@@ -59,7 +63,8 @@ fn show_emitter(ui: &mut egui::Ui, world: &mut World, entity: Entity) {
     let mut by_hand = world.get::<ByHand>(entity).is_some();
     // What is done to a recorded one becomes an event: it is taken over by that.
     let is_recorded = world.contains_resource::<Recording>();
-    let is_of_scene = world.get::<SceneEntity>(entity).is_some() && world.get::<Added>(entity).is_none();
+    let is_of_scene =
+        world.get::<SceneEntity>(entity).is_some() && world.get::<AddedEmitter>(entity).is_none();
     let is_scripted = is_of_scene && !is_recorded;
     if is_scripted {
         let about = "Its keys and working hours do not apply while it is in your hand";

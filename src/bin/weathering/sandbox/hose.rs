@@ -49,8 +49,11 @@ fn point(
     cameras: Query<(&Camera, &GlobalTransform), With<View>>,
     mut pointed: ResMut<Pointed>,
 ) {
-    pointed.pressed = buttons.just_pressed(MouseButton::Left) && !input.pointer;
-    pointed.held = buttons.pressed(MouseButton::Left) && (pointed.held || pointed.pressed);
+    let is_pressed = buttons.just_pressed(MouseButton::Left);
+    pointed.pressed = is_pressed && !input.pointer;
+    // Also where a slow frame has seen it pressed and let go of: then for that frame.
+    let is_held = buttons.pressed(MouseButton::Left) && pointed.held;
+    pointed.held = if is_pressed { pointed.pressed } else { is_held };
     let cursor = window.single().ok().and_then(Window::cursor_position);
     pointed.ray = cursor.zip(cameras.iter().next()).and_then(|(cursor, (camera, transform))| {
         // The part of the window that is another camera's is not pointed at.
@@ -206,6 +209,39 @@ mod tests {
             let along = (target - aim.translation).normalize();
             assert!(aim.forward().dot(along) > 0.9999, "{direction}");
         }
+    }
+
+    #[test]
+    fn a_press_counts_however_long_the_frame_is_in_which_it_ends() {
+        let mut world = World::new();
+        world.init_resource::<Pointed>();
+        world.init_resource::<UiInput>();
+        world.init_resource::<ButtonInput<MouseButton>>();
+        let mut schedule = Schedule::default();
+        schedule.add_systems(point);
+        // Of a frame: whether the pointer is over a panel, and what the button does.
+        let mut is_held = |over_panel: bool, edit: fn(&mut ButtonInput<MouseButton>)| {
+            world.resource_mut::<UiInput>().pointer = over_panel;
+            let mut buttons = world.resource_mut::<ButtonInput<MouseButton>>();
+            buttons.clear();
+            edit(&mut buttons);
+            schedule.run(&mut world);
+            world.resource::<Pointed>().held
+        };
+        let click = |buttons: &mut ButtonInput<MouseButton>| {
+            buttons.press(MouseButton::Left);
+            buttons.release(MouseButton::Left);
+        };
+        assert!(is_held(false, click));
+        assert!(!is_held(false, |_| {}));
+        assert!(is_held(false, |buttons| buttons.press(MouseButton::Left)));
+        // What begins in the scene goes on over a panel, and not the other way round.
+        assert!(is_held(true, |_| {}));
+        assert!(!is_held(true, |buttons| buttons.release(MouseButton::Left)));
+        assert!(is_held(false, click));
+        assert!(!is_held(true, click));
+        assert!(!is_held(true, |buttons| buttons.press(MouseButton::Left)));
+        assert!(!is_held(false, |_| {}));
     }
 
     #[test]

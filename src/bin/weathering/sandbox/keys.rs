@@ -1,5 +1,6 @@
 //! Keys, and the list of them.
 
+use bevy::input::InputSystems;
 use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::prelude::*;
 use bevy_egui::egui;
@@ -38,7 +39,9 @@ const KEYS: &[(&str, &str)] = &[
 ];
 
 pub fn plugin(app: &mut App) {
-    app.add_systems(Update, (reset, choose).run_if(keyboard_is_free));
+    app.add_systems(Update, reset.run_if(keyboard_is_free))
+        // Before tools do anything: a slow frame may see one chosen and used.
+        .add_systems(PreUpdate, choose.run_if(keyboard_is_free).after(InputSystems));
 }
 
 fn reset(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
@@ -143,9 +146,13 @@ mod tests {
         let about = KEYS.iter().map(|(_, does)| does.replace('(', ""));
         listed.extend(about.flat_map(|does| names(&does)));
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/bin/weathering/sandbox");
-        let mut used = BTreeSet::new();
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let text = std::fs::read_to_string(entry.unwrap().path()).unwrap();
+        let (mut used, mut paths) = (BTreeSet::new(), vec![folder]);
+        while let Some(path) = paths.pop() {
+            if path.is_dir() {
+                paths.extend(std::fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()));
+                continue;
+            }
+            let text = std::fs::read_to_string(path).unwrap();
             let code = text.split("#[cfg(test)]").next().unwrap_or_default();
             let keys = code.split("KeyCode::").skip(1);
             let keys = keys.map(|rest| rest.split(|letter: char| !letter.is_alphanumeric()).next());

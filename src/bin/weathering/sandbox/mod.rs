@@ -47,7 +47,7 @@ use bevy::prelude::*;
 use bevy::render::renderer::RenderAdapterInfo;
 use bevy::window::PrimaryWindow;
 use bevy_weathering::WeatheringPlugins;
-use bevy_weathering::effect::{EffectTable, WeatherEffect};
+use bevy_weathering::effect::WeatherEffect;
 use bevy_weathering::emitter::TrackSources;
 use bevy_weathering::overlay::SplatBudget;
 use bevy_weathering::overload::{LiveBudget, LiveBudgetPlugin, StageTimesPlugin};
@@ -89,8 +89,7 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
     .insert_resource(AssetTree(loaded.tree.clone()))
     .add_plugins(scenario);
     model::light_shade(app.world_mut(), model::is_model(&arguments.file));
-    let effects = app.world().resource::<EffectTable>().rows().len();
-    app.insert_resource(open::Opened { loaded: first, effects })
+    app.insert_resource(open::Opened { loaded: first })
         .insert_resource(shots::OutFolder(arguments.out.clone()))
         .insert_resource(begun)
         .add_plugins((ui::plugin, settings::plugin, selection::plugin, camera::plugin))

@@ -8,7 +8,6 @@ use std::thread::{JoinHandle, spawn};
 
 use bevy::prelude::*;
 use bevy::window::FileDragAndDrop;
-use bevy_weathering::effect::EffectTable;
 use bevy_weathering::scenario::{
     LoadedScenario, PreparedScenario, Scenario, ScenarioStatus, TextureSpec, switch_scenario,
 };
@@ -21,8 +20,6 @@ use super::{export, model, record, saving, split};
 pub struct Opened {
     /// The scenario, or that of a model by itself.
     pub loaded: LoadedScenario,
-    /// Rows of the effect table that belong to it.
-    pub effects: usize,
 }
 
 /// What is being opened.
@@ -121,8 +118,7 @@ fn finish(world: &mut World) {
             split::end(world);
             switch_scenario(world, prepared);
             model::light_shade(world, is_model);
-            let effects = world.resource::<EffectTable>().rows().len();
-            world.insert_resource(Opened { loaded, effects });
+            world.insert_resource(Opened { loaded });
             world.resource_mut::<Note>().tell(format!("opened {}", file.display()));
         }
         Err(error) if is_first => {

@@ -11,7 +11,6 @@ use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use bevy_egui::egui;
 use bevy_weathering::clock::{ShownTime, WeatheringClock};
-use bevy_weathering::effect::EffectTable;
 use bevy_weathering::emitter::Emitter;
 use bevy_weathering::record::{self, Beginning, RecordError, Recording};
 use bevy_weathering::scenario::{
@@ -188,8 +187,7 @@ fn start(world: &mut World, base: LoadedScenario, prepared: PreparedScenario) {
             _ => {}
         }
     }
-    let effects = world.resource::<EffectTable>().rows().len();
-    world.insert_resource(Opened { loaded: base.clone(), effects });
+    world.insert_resource(Opened { loaded: base.clone() });
     let told = format!("recording into {}", base.file.display());
     record::begin(world, base);
     world.insert_resource(LastView::default());
@@ -204,6 +202,7 @@ pub fn finish(world: &mut World) {
     }
     saving::give_up_moment(world);
     let file = write(world);
+    added::keep_stays(world);
     record::end(world);
     // It is what runs, and what is saved from now on fits the file as it is now.
     match file.map(|file| Scenario::load(&file)) {

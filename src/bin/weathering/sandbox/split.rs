@@ -3,8 +3,8 @@
 //! A second camera looks at the copy from where the first one looks at the scene, and shows it on the right of a divider. What
 //! falls on the scene falls on the copy, too: each emitter has one there, which follows it but draws lots of its own. Render
 //! layers keep the two from seeing each other's surfaces.
-//!
-//! Surfaces that are posed are not copied.
+
+mod copies;
 
 use bevy::camera::visibility::RenderLayers;
 use bevy::camera::{Exposure, Viewport};
@@ -13,10 +13,8 @@ use bevy::light::{EnvironmentMapLight, Skybox};
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_egui::egui;
-use bevy_weathering::collision::{CollisionScene, DeformingCollider};
+use bevy_weathering::collision::CollisionScene;
 use bevy_weathering::emitter::Emitter;
-use bevy_weathering::material::{DryMaterial, PorousMaterial, StandingWater, WettingTextures};
-use bevy_weathering::overlay::Weatherable;
 use bevy_weathering::particle::ParticleMesh;
 use bevy_weathering::record::Recording;
 use bevy_weathering::scenario::SceneEntity;
@@ -57,6 +55,11 @@ pub fn plugin(app: &mut App) {
             PostUpdate,
             (divide, follow_camera).run_if(resource_exists::<Split>).before(TransformSystems::Propagate),
         )
+        .add_systems(
+            PostUpdate,
+            // Where everything is in this frame.
+            copies::follow_poses.run_if(resource_exists::<Split>).after(TransformSystems::Propagate),
+        )
         .add_panel(Place::Side, "Compare", show);
 }
 
@@ -80,7 +83,7 @@ fn begin(world: &mut World) {
     }
     let bounds = scene.bounds();
     let offset = offset(bounds);
-    copy_surfaces(world, offset);
+    copies::copy_surfaces(world, offset);
     let both = RenderLayers::from_layers(&LAYERS);
     let mut shared = world.query_filtered::<Entity, Or<(With<DirectionalLight>, With<ParticleMesh>)>>();
     for entity in shared.iter(world).collect::<Vec<_>>() {
@@ -102,41 +105,6 @@ pub fn end(world: &mut World) {
     let mut cameras = world.query_filtered::<&mut Camera, With<View>>();
     for mut camera in cameras.iter_mut(world) {
         camera.viewport = None;
-    }
-}
-
-fn copy_surfaces(world: &mut World, offset: Vec3) {
-    let mut surfaces =
-        world.query_filtered::<Entity, (With<Weatherable>, Without<CopyOf>, Without<DeformingCollider>)>();
-    for original in surfaces.iter(world).collect::<Vec<_>>() {
-        let of = world.entity(original);
-        let (Some(surface), Some(mesh), Some(place)) =
-            (of.get::<Weatherable>(), of.get::<Mesh3d>(), of.get::<GlobalTransform>())
-        else {
-            continue;
-        };
-        // As it was before it was exchanged for its weathered form.
-        let dry = of.get::<DryMaterial>().map(|dry| dry.0.clone());
-        let dry = dry.or_else(|| of.get::<MeshMaterial3d<StandardMaterial>>().map(|own| own.0.clone()));
-        let Some(dry) = dry else { continue };
-        let mut transform = place.compute_transform();
-        transform.translation += offset;
-        let name = of.get::<Name>().map_or_else(|| original.to_string(), ToString::to_string);
-        let copy = (
-            CopyOf(original),
-            SceneEntity,
-            Name::new(format!("B: {name}")),
-            *surface,
-            mesh.clone(),
-            MeshMaterial3d(dry),
-            of.get::<PorousMaterial>().copied().unwrap_or_default(),
-            of.get::<StandingWater>().copied().unwrap_or_default(),
-            of.get::<WettingTextures>().cloned().unwrap_or_default(),
-            transform,
-            GlobalTransform::from(transform),
-            RenderLayers::layer(LAYERS[1]),
-        );
-        world.spawn(copy);
     }
 }
 

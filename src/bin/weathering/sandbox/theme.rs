@@ -1,6 +1,9 @@
 //! How panels look: dark, calm, with text that can be read at 1280 x 720 and, by the zoom, on screens of any density.
 
-use bevy_egui::egui::{self, Color32, FontId, Stroke, TextStyle, Vec2};
+use std::ops::RangeInclusive;
+
+use bevy_egui::egui::style::NumberFormatter;
+use bevy_egui::egui::{self, Color32, FontId, Stroke, TextStyle, Vec2, emath};
 
 /// What stands out.
 pub const ACCENT: Color32 = Color32::from_rgb(88, 166, 214);
@@ -13,7 +16,9 @@ pub const ZOOM: (f32, f32) = (0.6, 3.0);
 /// Dresses a context. Once: it is kept from frame to frame.
 pub fn apply(context: &egui::Context) {
     context.set_theme(egui::Theme::Dark);
+    let formatter = NumberFormatter::new(without_sign_of_zero);
     context.all_styles_mut(|style| {
+        style.number_formatter = formatter.clone();
         style.text_styles = [
             (TextStyle::Small, FontId::proportional(11.0)),
             (TextStyle::Body, FontId::proportional(13.5)),
@@ -40,9 +45,31 @@ pub fn apply(context: &egui::Context) {
     });
 }
 
+/// A number as egui writes it, but 0 where all digits are: angles of what points straight ahead come as -0, or as less than is
+/// shown.
+fn without_sign_of_zero(value: f64, decimals: RangeInclusive<usize>) -> String {
+    let text = emath::format_with_decimals_in_range(value, decimals);
+    match text.strip_prefix('-') {
+        Some(digits) if digits.bytes().all(|byte| matches!(byte, b'0' | b'.')) => digits.to_owned(),
+        _ => text,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn zero_has_no_sign_and_other_numbers_keep_theirs() {
+        let context = egui::Context::default();
+        apply(&context);
+        let formatter = context.style_of(egui::Theme::Dark).number_formatter.clone();
+        let shown = |value: f64, decimals| formatter.format(value, decimals);
+        assert_eq!(shown(-0.0, 0..=2), "0");
+        assert_eq!((shown(-1e-9, 1..=2), shown(-0.001, 1..=2)), ("0.0".into(), "0.00".into()));
+        assert_eq!((shown(-0.25, 0..=2), shown(-10.0, 0..=2)), ("-0.25".into(), "-10".into()));
+        assert_eq!((shown(0.0, 0..=2), shown(90.0, 0..=1)), ("0".into(), "90".into()));
+    }
 
     /// WCAG's relative luminance.
     fn luminance(color: Color32) -> f32 {

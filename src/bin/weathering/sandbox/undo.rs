@@ -105,6 +105,12 @@ impl Undo {
         self.steps.push(EMITTER, Step::Emitter(done));
     }
 
+    /// Nothing of what was done is there any more.
+    pub fn clear(&mut self) {
+        self.steps.clear();
+        self.current.clear();
+    }
+
     /// How much may be taken back: strokes and emitters.
     pub fn count(&self) -> usize {
         self.steps.entries.len()
@@ -159,8 +165,7 @@ fn put_back(world: &mut World, stroke: &[Before]) -> &'static str {
 /// What was painted before the scene began anew is no more.
 fn forget(clock: Res<WeatheringClock>, mut undo: ResMut<Undo>, mut last: Local<u32>) {
     if clock.tick() < *last {
-        undo.steps.clear();
-        undo.current.clear();
+        undo.clear();
     }
     *last = clock.tick();
 }

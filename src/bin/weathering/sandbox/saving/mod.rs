@@ -1,0 +1,233 @@
+//! Saving the scene into a folder and going on from one, with `src/save`.
+//!
+//! Colour maps live on the GPU: time is paused, they are read back, and then all is written on another thread. What has been
+//! saved here is a scenario's state, with emitters as they are set and those that were added, and goes on in
+//! `weathering replay --resume`, too; so nothing else of the sandbox's own may be in it.
+
+mod panel;
+mod steps;
+
+use std::path::PathBuf;
+
+use bevy::prelude::*;
+use bevy::tasks::{Task, block_on};
+use bevy_weathering::export::ColorReadback;
+use bevy_weathering::save::{SaveError, SavedScene};
+
+use super::ui::{Note, keyboard_is_free};
+
+pub use panel::show;
+pub use steps::{give_up_moment, keep_moment};
+
+/// Frames between pausing and reading, in which the last splats are painted.
+const SETTLE: u32 = 4;
+
+/// What the state that is taken is for.
+enum Purpose {
+    /// A folder.
+    Folder(PathBuf),
+    /// A moment of a session that is recorded; time goes on then, if it did before.
+    Moment { goes_on: bool },
+}
+
+/// A scene that is being saved, or gone on with.
+#[derive(Resource, Default)]
+pub struct Saving(Option<Step>);
+
+enum Step {
+    /// So many frames until the maps are read.
+    Settling {
+        purpose: Purpose,
+        frames: u32,
+    },
+    Reading {
+        purpose: Purpose,
+        colors: ColorReadback,
+    },
+    /// So many frames until surfaces that were reset have their new, empty maps.
+    Clearing {
+        folder: PathBuf,
+        scene: Box<SavedScene>,
+        frames: u32,
+    },
+    /// On another thread.
+    Writing {
+        folder: PathBuf,
+        task: Task<Result<(), SaveError>>,
+    },
+}
+
+pub fn plugin(app: &mut App) {
+    app.init_resource::<panel::Folder>()
+        .init_resource::<Saving>()
+        .add_systems(Update, (panel::press.run_if(keyboard_is_free), steps::advance).chain());
+}
+
+impl Saving {
+    /// A scene is on its way to the disk.
+    pub fn is_saving(&self) -> bool {
+        matches!(self.0, Some(Step::Settling { .. } | Step::Reading { .. } | Step::Writing { .. }))
+    }
+
+    /// Waits for what is being written; what is not that far yet is given up.
+    pub fn finish(&mut self) {
+        if let Some(Step::Writing { folder, task }) = self.0.take() {
+            match block_on(task) {
+                Ok(()) => info!("saved {}", folder.display()),
+                Err(error) => error!("{error}"),
+            }
+        }
+    }
+}
+
+/// Whether a scene is being saved, or gone on with.
+pub fn is_busy(world: &World) -> bool {
+    world.resource::<Saving>().0.is_some()
+}
+
+/// Whether the scene has to stay as it is, or is being put back: what is on its way to the disk already may be left behind.
+pub fn is_taking(world: &World) -> bool {
+    let step = &world.resource::<Saving>().0;
+    matches!(step, Some(Step::Settling { .. } | Step::Reading { .. } | Step::Clearing { .. }))
+}
+
+/// Whether time stands still only until a moment is kept.
+pub fn goes_on_later(world: &World) -> bool {
+    matches!(
+        world.resource::<Saving>().0,
+        Some(
+            Step::Settling { purpose: Purpose::Moment { goes_on: true }, .. }
+                | Step::Reading { purpose: Purpose::Moment { goes_on: true }, .. }
+        )
+    )
+}
+
+/// If time stands still for a moment that is kept: whether it goes on then is the other way round from now on.
+pub fn toggle_later(world: &mut World) -> bool {
+    let mut saving = world.resource_mut::<Saving>();
+    let (Some(Step::Settling { purpose, .. }) | Some(Step::Reading { purpose, .. })) = &mut saving.0 else {
+        return false;
+    };
+    let Purpose::Moment { goes_on } = purpose else { return false };
+    *goes_on = !*goes_on;
+    true
+}
+
+/// Another scene takes the place of this one: what is not taken of it yet never will be.
+pub fn give_up(world: &mut World) {
+    give_up_moment(world);
+    if is_taking(world) {
+        world.resource_mut::<Saving>().0 = None;
+        world.resource_mut::<Note>().complain("not saved, or gone on with: another scene was opened");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::tasks::AsyncComputeTaskPool;
+    use bevy::window::WindowCloseRequested;
+
+    use super::super::leave;
+    use super::super::ui::{Help, UiInput};
+    use super::*;
+
+    fn app() -> App {
+        let mut app = App::new();
+        app.add_message::<WindowCloseRequested>()
+            .init_resource::<ButtonInput<KeyCode>>()
+            .init_resource::<UiInput>()
+            .init_resource::<Help>()
+            .init_resource::<Note>()
+            .init_resource::<Saving>();
+        leave::plugin(&mut app);
+        app
+    }
+
+    fn close(app: &mut App) {
+        app.world_mut().write_message(WindowCloseRequested { window: Entity::PLACEHOLDER });
+        app.update();
+    }
+
+    fn settling() -> Saving {
+        Saving(Some(Step::Settling { purpose: Purpose::Folder("saved".into()), frames: SETTLE }))
+    }
+
+    #[test]
+    fn a_window_that_is_closed_while_a_scene_is_saved_stays_until_it_is() {
+        let mut app = app();
+        app.insert_resource(settling());
+        close(&mut app);
+        for _ in 0..3 {
+            assert_eq!(app.should_exit(), None);
+            app.update();
+        }
+        app.insert_resource(Saving(None));
+        app.update();
+        assert_eq!(app.should_exit(), Some(AppExit::Success));
+    }
+
+    #[test]
+    fn who_insists_leaves_at_once_and_without_anything_to_save_so_does_everyone() {
+        for (saving, times) in [(settling(), 2), (Saving(None), 1)] {
+            let mut app = app();
+            app.insert_resource(saving);
+            for _ in 0..times {
+                assert_eq!(app.should_exit(), None);
+                close(&mut app);
+            }
+            assert_eq!(app.should_exit(), Some(AppExit::Success));
+        }
+    }
+
+    #[test]
+    fn escape_closes_a_list_that_is_in_front_before_it_leaves() {
+        let mut app = app();
+        app.insert_resource(UiInput { popup: true, ..default() });
+        app.world_mut().resource_mut::<ButtonInput<KeyCode>>().press(KeyCode::Escape);
+        app.update();
+        assert_eq!(app.should_exit(), None);
+        app.insert_resource(UiInput::default());
+        app.update();
+        assert_eq!(app.should_exit(), Some(AppExit::Success));
+    }
+
+    #[test]
+    fn a_pause_while_a_moment_is_kept_comes_after_it() {
+        let mut world = World::new();
+        let purpose = Purpose::Moment { goes_on: true };
+        world.insert_resource(Saving(Some(Step::Settling { purpose, frames: SETTLE })));
+        assert!(is_taking(&world) && goes_on_later(&world));
+        assert!(toggle_later(&mut world) && !goes_on_later(&world));
+        assert!(toggle_later(&mut world) && goes_on_later(&world));
+        // What is saved into a folder stays paused then.
+        world.insert_resource(settling());
+        assert!(is_taking(&world) && !toggle_later(&mut world) && !goes_on_later(&world));
+    }
+
+    #[test]
+    fn of_a_scene_that_another_has_replaced_nothing_is_saved() {
+        let mut world = World::new();
+        world.init_resource::<Note>();
+        world.insert_resource(settling());
+        give_up(&mut world);
+        assert!(!is_busy(&world));
+    }
+
+    #[test]
+    fn the_program_does_not_end_before_a_file_that_is_being_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("late");
+        let to = file.clone();
+        let pool = AsyncComputeTaskPool::get_or_init(Default::default);
+        let task = pool.spawn(async move {
+            std::thread::sleep(std::time::Duration::from_millis(200));
+            std::fs::write(to, "whole").map_err(|source| SaveError::Write { path: "late".into(), source })
+        });
+        let mut app = app();
+        app.insert_resource(Saving(Some(Step::Writing { folder: folder.path().into(), task })));
+        // In the way of a signal or a lost device, which wait for nothing.
+        app.world_mut().write_message(AppExit::error());
+        app.update();
+        assert_eq!(std::fs::read_to_string(file).unwrap(), "whole");
+    }
+}
