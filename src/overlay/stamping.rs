@@ -19,12 +19,17 @@ const SPREAD_BY_VOLUME: f32 = 5.0 / 12.0;
 /// Radius of the mark of an impact, metres, before it is drawn out.
 fn radius(impact: &Impact, effect: &WeatherEffect, row: &EffectRow) -> f32 {
     let volume_mm3 = impact.volume_nl as f32 * 1e-3;
+    let speed = impact.velocity.dot(impact.normal).abs();
     let own = match effect.stamp_radius {
-        Some(radius) => radius * (volume_mm3 / effect.volume_mm3).min(1.0).powf(SPREAD_BY_VOLUME),
+        Some(radius) => {
+            let part = volume_mm3 / effect.volume_mm3;
+            // Most particles carry what the effect says, or more.
+            let by_volume = if part < 1.0 { part.powf(SPREAD_BY_VOLUME) } else { 1.0 };
+            radius * by_volume * row.width_by_speed(speed)
+        }
         None => {
             let diameter = row.diameters_mm[usize::from(impact.class)];
             let drops = (volume_mm3 / drop_mm3(diameter)).max(1.0);
-            let speed = impact.velocity.dot(impact.normal).abs();
             0.5e-3 * spread_mm(diameter, speed) * drops.sqrt()
         }
     };
@@ -37,12 +42,27 @@ fn stretch(impact: &Impact, effect: &WeatherEffect) -> f32 {
     (1.0 / steepness.max(0.05)).min(1.0 + effect.stamp_stretch)
 }
 
+/// How large the mark of an impact is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mark {
+    /// Radius before it is drawn out, metres.
+    radius: f32,
+    /// How much longer than wide, 1 or more.
+    stretch: f32,
+}
+
+impl Mark {
+    pub(super) fn of(impact: &Impact, row: &EffectRow, effect: &WeatherEffect) -> Self {
+        Self { radius: radius(impact, effect, row), stretch: stretch(impact, effect) }
+    }
+}
+
 /// Half the width and height, 1/256 texel, of the patch of a map with `size` texels along each side over which an impact's water,
 /// dust or snow is shared out: of the box around its mark. The mark is an ellipse, the patch lies straight on the map: so it is
 /// drawn out as the mark is where that lies along u or v, and wider than it in between.
-pub(super) fn patch_radius(impact: &Impact, row: &EffectRow, effect: &WeatherEffect, size: u32) -> [i32; 2] {
-    let own = radius(impact, effect, row);
-    let long = own * stretch(impact, effect);
+pub(super) fn patch_radius(impact: &Impact, mark: Mark, size: u32) -> [i32; 2] {
+    let own = mark.radius;
+    let long = own * mark.stretch;
     let flight = impact.velocity.reject_from(impact.normal).normalize_or_zero();
     let reach = impact.along.map(|axis| {
         let along = flight.dot(axis).clamp(-1.0, 1.0).powi(2);
@@ -84,14 +104,13 @@ pub(super) fn splat_from_impact(
     impact: &Impact,
     row: &EffectRow,
     effect: &WeatherEffect,
+    mark: Mark,
     (size, wrap): (u32, [Wrap; 2]),
     site: Option<&Site>,
-    tick: u32,
-    water_nl: u32,
+    (tick, water_nl): (u32, u32),
 ) -> Splat {
-    let own = radius(impact, effect, row);
-    let stretch = stretch(impact, effect);
-    let long = own * stretch;
+    let stretch = mark.stretch;
+    let long = mark.radius * stretch;
     let [r, g, b] = effect.diffuse.color;
     let [reflectance, smoothness, unused] = effect.specular.color;
     let mut splat = Splat {
@@ -192,7 +211,7 @@ mod tests {
     use super::super::frames::Frames;
     use super::*;
     use crate::collision::MeshTriangles;
-    use crate::effect::{EffectIndex, EffectTable};
+    use crate::effect::{Carries, EffectIndex, EffectTable, ShippedEffect};
     use crate::particle::Sequence;
     use crate::wetting::TexelGeometry;
 
@@ -219,12 +238,13 @@ mod tests {
         table.insert(Handle::default(), effect);
         let row = &table.rows()[0];
         let effect = row.effect.as_ref().unwrap();
-        splat_from_impact(impact, row, effect, (64, [Wrap::Clamp; 2]), site, 1, impact.volume_nl)
+        let mark = Mark::of(impact, row, effect);
+        splat_from_impact(impact, row, effect, mark, (64, [Wrap::Clamp; 2]), site, (1, impact.volume_nl))
     }
 
     fn paint(stamp_radius: f32) -> WeatherEffect {
         let diffuse = crate::effect::Paint { opacity: 1.0, ..default() };
-        WeatherEffect { stamp_radius: Some(stamp_radius), diffuse, ..default() }
+        WeatherEffect { stamp_radius: Some(stamp_radius), stamp_speed: Some(0.0), diffuse, ..default() }
     }
 
     #[test]
@@ -242,6 +262,38 @@ mod tests {
         let many = Impact { volume_nl: 4189 * 10_000, ..straight };
         let radius = splat(&many, drops, None).radius[0] as f32 / 256.0 / 32.0;
         assert!((0.5..0.65).contains(&radius), "{radius} m");
+    }
+
+    #[test]
+    fn at_a_quarter_of_the_speed_a_mark_of_as_much_water_is_half_as_wide() {
+        let shipped = ShippedEffect::ALL.map(|shipped| (shipped.name, shipped.read().unwrap()));
+        for (name, effect) in shipped.into_iter().chain([("as drops spread", WeatherEffect::default())]) {
+            let spreads = matches!(effect.carries, Carries::Water | Carries::Mud(_));
+            let volume_nl = (effect.volume_mm3 * 1000.0) as u32;
+            let mut table = EffectTable::default();
+            table.insert(Handle::default(), effect);
+            let row = &table.rows()[0];
+            let radius = |velocity: Vec3| {
+                let impact = Impact { volume_nl, ..impact(velocity) };
+                Mark::of(&impact, row, row.effect.as_ref().unwrap()).radius
+            };
+            // What lies along the surface does not count.
+            let part = radius(Vec3::new(3.0, -1.5, 0.0)) / radius(Vec3::NEG_Y * 6.0);
+            let expected = if spreads { 0.5 } else { 1.0 };
+            assert!((part - expected).abs() < 1e-3, "{name}: {part}");
+        }
+    }
+
+    #[test]
+    fn shipped_marks_are_about_as_large_as_their_drops_spread() {
+        // The hose's slugs are 2.7 drops of 4 mm, a drip is one of 3.6 mm.
+        let hose = ShippedEffect::named("hose").unwrap().read().unwrap();
+        for (effect, diameter) in [(hose, 4.0), (crate::wetting::drip_effect(), 3.63)] {
+            let drops = effect.volume_mm3 / drop_mm3(diameter);
+            let spread = 0.5e-3 * spread_mm(diameter, effect.stamp_speed.unwrap()) * drops.sqrt();
+            let part = effect.stamp_radius.unwrap() / spread;
+            assert!((part - 1.0).abs() < 0.06, "{part}");
+        }
     }
 
     #[test]
@@ -263,7 +315,8 @@ mod tests {
         let row = &table.rows()[0];
         let patch = |velocity: Vec3| {
             let effect = row.effect.as_ref().unwrap();
-            patch_radius(&impact(velocity), row, effect, 64).map(|radius| radius as f32 / 256.0)
+            let impact = impact(velocity);
+            patch_radius(&impact, Mark::of(&impact, row, effect), 64).map(|radius| radius as f32 / 256.0)
         };
         assert_eq!(patch(Vec3::NEG_Y), [8.0; 2]);
         assert_eq!(patch(Vec3::new(3.0, -1.0, 0.0)), [16.0, 8.0]);
