@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::frames::{FramesWork, SurfaceFrames, measure_frames, release_frames};
 use super::site::Site;
-use super::stamping::{Mark, patch_radius, splat_from_impact, unit_hash};
+use super::stamping::{Mark, deposit_stamp, patch_radius, splat_from_impact, unit_hash};
 use super::{MapLoss, MapSize, SizeMaps, Splat, StampAtlas, StampSpace, TexelArea, Weatherable, pool};
 use crate::clock::WeatheringClock;
 use crate::collision::{DeformingCollider, Impact, Impacts, SurfaceCollider};
@@ -213,7 +213,8 @@ pub fn deposit_splats(
             && let Some(kind) = kind_of(effect.carries)
             && solid_nl > 0
         {
-            matter.0.push(Deposit { center, radius, kind, volume_nl: solid_nl });
+            let stamp = deposit_stamp(impact, row, effect, mark, size.texels());
+            matter.0.push(Deposit { center, radius, kind, volume_nl: solid_nl, stamp });
         }
         if let Some(mut drops) = drops
             && splat.water_nl > 0

@@ -12,6 +12,7 @@ use crate::collision::Impact;
 use crate::effect::drops::{drop_mm3, spread_mm};
 use crate::effect::{EffectRow, StampTurn, WeatherEffect};
 use crate::material::film::ripples::pcg;
+use crate::matter::DepositStamp;
 
 /// A drop of diameter d spreads to `d We^1/4`; We grows with d, and d with the cube root of the volume.
 const SPREAD_BY_VOLUME: f32 = 5.0 / 12.0;
@@ -97,6 +98,48 @@ impl Axes {
         };
         Self { s: t.cross(front), t, n: front }
     }
+
+    /// Those that lie in the surface, for a mark that is longer than wide along its flight: across it is narrower.
+    fn drawn_out(&self, impact: &Impact, stretch: f32) -> [Vec3; 2] {
+        let flight = impact.velocity.reject_from(self.n).normalize_or_zero();
+        [self.s, self.t].map(|axis| {
+            let along = flight * axis.dot(flight);
+            along + (axis - along) * stretch
+        })
+    }
+}
+
+/// The front of the surface, on which the map lies.
+fn front(impact: &Impact) -> Vec3 {
+    if impact.back { -impact.normal } else { impact.normal }
+}
+
+/// The number of the stamp of an impact, for a mark with this radius on the map; none of a dome.
+fn stamp_number(impact: &Impact, row: &EffectRow, radius: [i32; 2], stretch: f32) -> Option<u32> {
+    let (first, count @ 1..) = row.stamps else { return None };
+    let variant = pcg(impact.sequence.0 ^ 0x5bd1_e995) % count;
+    Some(StampAtlas::number(first, variant, radius, stretch))
+}
+
+/// An axis of a stamp on the map: along u and v, 1/1024.
+fn row_on_map(axis: Vec3, impact: &Impact) -> [i32; 2] {
+    impact.along.map(|along| (axis.dot(along) * 1024.0).round() as i32)
+}
+
+/// How the stamp of an impact lies on a map of this size, as if it were painted there: its matter is shared out by it. None of a
+/// dome.
+pub(super) fn deposit_stamp(
+    impact: &Impact,
+    row: &EffectRow,
+    effect: &WeatherEffect,
+    mark: Mark,
+    size: u32,
+) -> Option<DepositStamp> {
+    let radius = Splat::radius_from_uv(impact.uv_per_metre * (mark.radius * mark.stretch), size);
+    let number = stamp_number(impact, row, radius, mark.stretch)?;
+    let axes = Axes::new(impact, effect.stamp_turn, front(impact));
+    let rows = axes.drawn_out(impact, mark.stretch).map(|axis| row_on_map(axis, impact));
+    Some(DepositStamp { number, radius, rows })
 }
 
 /// The stamp of an impact, on maps of this size with these edges.
@@ -124,20 +167,12 @@ pub(super) fn splat_from_impact(
         bump_opacity: if effect.bump == 0.0 { 0 } else { 255 },
         ..Zeroable::zeroed()
     };
-    if let (first, count @ 1..) = row.stamps {
-        let variant = pcg(impact.sequence.0 ^ 0x5bd1_e995) % count;
-        splat.stamp = StampAtlas::number(first, variant, splat.radius, stretch);
+    // Without paint any shape will do, and the plainest is the fastest.
+    if effect.paints() {
+        splat.stamp = stamp_number(impact, row, splat.radius, stretch).unwrap_or(0);
     }
-    // The map lies on the front.
-    let front = if impact.back { -impact.normal } else { impact.normal };
-    let axes = Axes::new(impact, effect.stamp_turn, front);
-    let flight = impact.velocity.reject_from(front).normalize_or_zero();
-    // Across the flight it is narrower than along it.
-    let drawn_out = |axis: Vec3| {
-        let along = flight * axis.dot(flight);
-        along + (axis - along) * stretch
-    };
-    let (s, t) = (drawn_out(axes.s), drawn_out(axes.t));
+    let axes = Axes::new(impact, effect.stamp_turn, front(impact));
+    let [s, t] = axes.drawn_out(impact, stretch);
     match site {
         Some(site) if effect.paints() => {
             // Never so small that it falls between texels.
@@ -145,10 +180,11 @@ pub(super) fn splat_from_impact(
             lay_in_space(&mut splat, site, [s, t, axes.n], &axes, long.max(0.75 * pitch));
         }
         _ => {
-            let [u, v] = impact.along;
-            let on_map =
-                |axis: Vec3| [axis.dot(u), axis.dot(v), 0.0].map(|part| (part * 1024.0).round() as i32);
-            (splat.row_s, splat.row_t) = (on_map(s), on_map(t));
+            let row = |axis: Vec3| {
+                let [along_u, along_v] = row_on_map(axis, impact);
+                [along_u, along_v, 0]
+            };
+            (splat.row_s, splat.row_t) = (row(s), row(t));
         }
     }
     splat
@@ -211,8 +247,9 @@ mod tests {
     use super::super::frames::Frames;
     use super::*;
     use crate::collision::MeshTriangles;
-    use crate::effect::{Carries, EffectIndex, EffectTable, ShippedEffect};
+    use crate::effect::{Carries, EffectIndex, EffectTable, Paint, ShippedEffect, StampSource};
     use crate::particle::Sequence;
+    use crate::stamps::StampKind;
     use crate::wetting::TexelGeometry;
 
     fn impact(velocity: Vec3) -> Impact {
@@ -243,7 +280,7 @@ mod tests {
     }
 
     fn paint(stamp_radius: f32) -> WeatherEffect {
-        let diffuse = crate::effect::Paint { opacity: 1.0, ..default() };
+        let diffuse = Paint { opacity: 1.0, ..default() };
         WeatherEffect { stamp_radius: Some(stamp_radius), stamp_speed: Some(0.0), diffuse, ..default() }
     }
 
@@ -294,6 +331,38 @@ mod tests {
             let part = effect.stamp_radius.unwrap() / spread;
             assert!((part - 1.0).abs() < 0.06, "{part}");
         }
+    }
+
+    #[test]
+    fn matter_is_shared_out_by_the_stamp_that_is_painted() {
+        let aslant = impact(Vec3::new(3.0, -1.0, 0.5));
+        let stamps = StampSource::Kind(StampKind::Splat);
+        let painted = WeatherEffect { stamps, stamp_stretch: 1.0, ..paint(0.25) };
+        let bare = WeatherEffect { diffuse: Paint::default(), ..painted.clone() };
+        let mut atlas = StampAtlas::default();
+        let mut both = |effect: WeatherEffect| {
+            let mut table = EffectTable::default();
+            table.insert(Handle::default(), effect);
+            for (numbers, set) in table.without_stamps() {
+                *numbers = (atlas.add(set).unwrap(), set.variants.len() as u32);
+            }
+            let row = &table.rows()[0];
+            let effect = row.effect.as_ref().unwrap();
+            let mark = Mark::of(&aslant, row, effect);
+            let map = (64, [Wrap::Clamp; 2]);
+            let splat = splat_from_impact(&aslant, row, effect, mark, map, None, (1, aslant.volume_nl));
+            (splat, deposit_stamp(&aslant, row, effect, mark, 64))
+        };
+        let (splat, lies) = both(painted);
+        let lies = lies.unwrap();
+        assert!(splat.stamp > 0);
+        assert_eq!((lies.number, lies.radius), (splat.stamp, splat.radius));
+        assert_eq!(lies.rows, [splat.row_s, splat.row_t].map(|[along_u, along_v, _]| [along_u, along_v]));
+        // What paints nothing has its shape, too, but painters are not told.
+        let (splat, unpainted) = both(bare.clone());
+        assert_eq!((splat.stamp, unpainted), (0, Some(lies)));
+        let (_, dome) = both(WeatherEffect { stamps: StampSource::Dome, ..bare });
+        assert_eq!(dome, None);
     }
 
     #[test]
