@@ -48,7 +48,8 @@ pub struct WeatherEffect {
     pub jet: bool,
     /// Multiplies gravity: 1 falls, 0 floats.
     pub gravity_scale: f32,
-    /// Shapes of the mark on the surface. Of an effect made in code, stamps of a kind are made when it is first used.
+    /// Shapes of the mark on the surface: of what is painted, and by which dust, mud and snow lie where they came. Of an effect made
+    /// in code, stamps of a kind are made when it is first used.
     pub stamps: StampSource,
     /// Radius of the mark of a particle with `volume_mm3` or more that strikes with `stamp_speed`, in metres. With less it is
     /// smaller, by (V/V₀)^(5/12), and of water and mud it goes by (v/v₀)^(1/2): as drops spread, to D We^(1/4). Not given: of a
