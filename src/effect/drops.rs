@@ -91,7 +91,7 @@ pub fn spread_mm(diameter_mm: f32, speed: f32) -> f32 {
     /// Density over surface tension of water, s²/m³.
     const RHO_OVER_SIGMA: f32 = 998.0 / 0.0728;
     let weber = RHO_OVER_SIGMA * speed * speed * diameter_mm * 1e-3;
-    diameter_mm * weber.max(1.0).powf(0.25)
+    diameter_mm * weber.max(1.0).sqrt().sqrt()
 }
 
 /// Whether a drop splashes: `We^(1/2) Re^(1/4) > 57.7` (Mundo et al. 1995). Speed in m/s, along the wall's normal.

@@ -129,6 +129,7 @@ impl WeatherEffect {
         zero_to("splash", self.splash, 0.5, "0 to 0.5")?;
         within("gravity_scale", self.gravity_scale, -10.0, 10.0, "-10 to 10")?;
         within("stamp_radius", self.stamp_radius.unwrap_or(1.0), 1.0e-6, 100.0, "0.000001 to 100 m")?;
+        zero_to("stamp_speed", self.stamp_speed.unwrap_or(0.0), 1000.0, "0 to 1000 m/s")?;
         zero_to("stamp_stretch", self.stamp_stretch, 7.0, "0 to 7")?;
         zero_to("stamp_radius_jitter", self.stamp_radius_jitter, 0.9, "0 to 0.9")?;
         self.diffuse.validate("diffuse.color", "diffuse.opacity")?;
@@ -190,6 +191,9 @@ mod tests {
             ("(volume_mm3: -1.0)", "volume_mm3"),
             ("(volume_mm3: NaN)", "volume_mm3"),
             ("(stamp_radius: 0.0)", "stamp_radius"),
+            ("(stamp_speed: -1.0)", "stamp_speed"),
+            ("(stamp_speed: NaN)", "stamp_speed"),
+            ("(stamp_speed: 1001.0)", "stamp_speed"),
             ("(diffuse: (opacity: 2.0))", "diffuse.opacity"),
             ("(bump: inf)", "bump"),
         ] {

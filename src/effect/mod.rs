@@ -48,12 +48,18 @@ pub struct WeatherEffect {
     pub jet: bool,
     /// Multiplies gravity, -10..=10: 1 falls, 0 floats.
     pub gravity_scale: f32,
-    /// Shapes of the mark on the surface. Of an effect made in code, stamps of a kind are made when it is first used.
+    /// Shapes of the mark on the surface: of what is painted, and by which dust, mud and snow lie where they came. Of an effect made
+    /// in code, stamps of a kind are made when it is first used.
     pub stamps: StampSource,
-    /// Radius of the mark of a particle with `volume_mm3` or more, metres, 1e-6..=100; with less it is smaller, by (V/V₀)^(5/12),
-    /// as drops of one speed spread. Not given: of a round patch as large as what its drops spread to
-    /// ([`spread_mm`](drops::spread_mm)), all of them together.
+    /// Radius of the mark of a particle with `volume_mm3` or more that strikes with `stamp_speed`, metres,
+    /// 1e-6..=100. With less it is
+    /// smaller, by (V/V₀)^(5/12), and of water and mud it goes by (v/v₀)^(1/2): as drops spread, to D We^(1/4). Not given: of a
+    /// round patch as large as what its drops spread to ([`spread_mm`](drops::spread_mm)), all of them together.
     pub stamp_radius: Option<f32>,
+    /// Speed along the surface's normal, m/s, at which what carries water or mud leaves a mark of `stamp_radius`; 0..=1000. Slower it
+    /// is smaller, faster it is larger, from [`Self::LEAST_BY_SPEED`] to [`Self::MOST_BY_SPEED`] times. At 0 it is as large at any
+    /// speed, and so it always is for dust and snow, which do not spread. Not given: that of its fall.
+    pub stamp_speed: Option<f32>,
     /// Each stamp's radius is drawn evenly from `stamp_radius` times 1 ± this; 0..=0.9.
     pub stamp_radius_jitter: f32,
     /// How the mark is turned.
@@ -151,6 +157,11 @@ impl WeatherEffect {
     pub const MAX_FILE_BYTES: u64 = 1 << 20;
     /// The largest file of its stamps that is read: twice what the largest takes without compression.
     pub const MAX_PICTURE_BYTES: u64 = 128 << 20;
+    /// No mark is narrower for its speed than by this: of a sixteenth of `stamp_speed` or less. There a drop hardly spreads, and has
+    /// a size of its own.
+    pub const LEAST_BY_SPEED: f32 = 0.25;
+    /// No mark is wider for its speed than by this: of four times `stamp_speed` or more. What is so fast breaks up.
+    pub const MOST_BY_SPEED: f32 = 2.0;
 
     /// Whether it leaves colour, gloss or relief.
     pub fn paints(&self) -> bool {
@@ -172,6 +183,7 @@ impl Default for WeatherEffect {
             gravity_scale: 1.0,
             stamps: StampSource::default(),
             stamp_radius: None,
+            stamp_speed: None,
             stamp_radius_jitter: 0.0,
             stamp_turn: StampTurn::default(),
             stamp_stretch: 0.0,

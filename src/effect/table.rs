@@ -23,6 +23,8 @@ pub struct EffectRow {
     pub diameters_mm: [f32; SIZE_CLASSES],
     /// How fast those fall in still air, m/s.
     terminal_speeds: [f32; SIZE_CLASSES],
+    /// Speed along the normal at which its marks are as large as it says, m/s; 0 if speed does not count.
+    stamp_speed: f32,
     /// Numbers of its stamps in the [`StampAtlas`](crate::overlay::StampAtlas): the first, and how many
     /// variants there are.
     pub stamps: (u32, u32),
@@ -38,6 +40,7 @@ impl EffectRow {
             effect: None,
             diameters_mm: none,
             terminal_speeds: none,
+            stamp_speed: 0.0,
             stamps: (0, 0),
             stamp_set: None,
         }
@@ -50,6 +53,13 @@ impl EffectRow {
             (None, Carries::Dust) => settling_speed(f64::from(mm)) as f32,
             (None, Carries::Water | Carries::Mud(_) | Carries::Snow) => fall_speed(f64::from(mm)) as f32,
         });
+        self.stamp_speed = match effect.carries {
+            // Of drops of many sizes: of those in their middle.
+            Carries::Water | Carries::Mud(_) => {
+                effect.stamp_speed.unwrap_or(self.terminal_speeds[SIZE_CLASSES / 2])
+            }
+            Carries::Dust | Carries::Snow => 0.0,
+        };
         let source = |effect: &WeatherEffect| (effect.stamps.clone(), effect.stamp_set.clone());
         // Stamps are not made again with every other edit.
         if self.effect.as_ref().is_none_or(|old| source(old) != source(&effect)) {
@@ -69,6 +79,17 @@ impl EffectRow {
     /// Speed at which drag balances gravity, m/s, for drops of a class; 0 is no drag.
     pub fn terminal_speed(&self, class: usize) -> f32 {
         self.terminal_speeds[class]
+    }
+
+    /// How many times as wide as `stamp_radius` a mark is by its speed along the normal, m/s: the square root of that over
+    /// `stamp_speed`, within bounds; 1 if speed does not count. With the volume it is all of We^(1/4).
+    pub fn width_by_speed(&self, normal_speed: f32) -> f32 {
+        if self.stamp_speed <= 0.0 {
+            return 1.0;
+        }
+        (normal_speed / self.stamp_speed)
+            .sqrt()
+            .clamp(WeatherEffect::LEAST_BY_SPEED, WeatherEffect::MOST_BY_SPEED)
     }
 }
 
@@ -210,6 +231,32 @@ mod tests {
         // Grains of 50 micrometres.
         let dust = speed(ShippedEffect::named("dust").unwrap().read().unwrap());
         assert!((dust - 0.18).abs() < 0.005, "{dust}");
+    }
+
+    #[test]
+    fn a_mark_is_as_wide_as_the_root_of_its_speed_within_bounds_and_dust_does_not_spread() {
+        let mut table = EffectTable::default();
+        let mut at = |effect: WeatherEffect, speed: f32| {
+            table.insert(Handle::default(), effect).unwrap();
+            table.rows()[0].width_by_speed(speed)
+        };
+        let own = WeatherEffect { stamp_speed: Some(4.0), ..default() };
+        assert_eq!([1.0, 4.0, 9.0].map(|speed| at(own.clone(), speed)), [0.5, 1.0, 1.5]);
+        let (least, most) = (WeatherEffect::LEAST_BY_SPEED, WeatherEffect::MOST_BY_SPEED);
+        assert_eq!([0.0, 0.1, 900.0].map(|speed| at(own.clone(), speed)), [least, least, most]);
+        // Of the smallest number that is none.
+        let tiny = WeatherEffect { stamp_speed: Some(f32::from_bits(1)), ..default() };
+        assert_eq!([0.0, 1.0].map(|speed| at(tiny.clone(), speed)), [least, most]);
+        // Not given it is that of the fall; what falls without drag has none.
+        let fall = WeatherEffect { terminal_speed: Some(8.0), ..default() };
+        assert_eq!((at(fall.clone(), 8.0), at(fall.clone(), 2.0)), (1.0, 0.5));
+        let mud = WeatherEffect { carries: Carries::Mud(0.4), ..fall.clone() };
+        assert_eq!(at(mud, 2.0), 0.5);
+        assert_eq!(at(WeatherEffect { terminal_speed: Some(0.0), ..default() }, 2.0), 1.0);
+        assert_eq!(at(WeatherEffect { stamp_speed: Some(0.0), ..fall.clone() }, 2.0), 1.0);
+        for carries in [Carries::Dust, Carries::Snow] {
+            assert_eq!(at(WeatherEffect { carries, ..own.clone() }, 1.0), 1.0, "{carries:?}");
+        }
     }
 
     #[test]

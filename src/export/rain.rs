@@ -64,6 +64,8 @@ pub(super) fn add_rain(world: &mut World, (low, high): (Vec3, Vec3), options: &E
         // Marks are that wide for particles of so much water.
         effect.volume_mm3 = emitter.particle_mm3(&effect);
         effect.stamp_radius = Some(wide);
+        // They stand for drops all over that area, however far each of those spreads.
+        effect.stamp_speed = Some(0.0);
     }
     emitter.effect = world.resource_mut::<Assets<WeatherEffect>>().add(effect.clone());
     world.resource_mut::<EffectTable>().insert(emitter.effect.clone(), effect);

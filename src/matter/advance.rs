@@ -1,6 +1,7 @@
 //! One tick of the matter of one surface.
 
 use super::SurfaceMatter;
+use super::shares::ShareScratch;
 use super::slide::{Slip, SnowFall, slide};
 use super::snow::melt;
 use super::wash::bind_dried;
@@ -10,7 +11,7 @@ use crate::wetting::{Now, SurfaceWater};
 /// Buffers that keep their memory from tick to tick.
 #[derive(Debug, Default)]
 pub(crate) struct MatterScratch {
-    pub(super) columns: Vec<(u32, [u32; 2])>,
+    pub(super) shares: ShareScratch,
     pub(super) tiles: Vec<u32>,
     pub(super) slips: Vec<Slip>,
     /// Snow that has fallen off since this was emptied, in order.
@@ -77,7 +78,11 @@ mod tests {
                     let radius = [0; 2].map(|_| 128 + random(6 * 256) as i32);
                     // Snow comes by the centimetre.
                     let most = if kind == MatterKind::Snow { 1_200_000 } else { 30_000 };
-                    ground.put(&place, tick, Deposit { center, radius, kind, volume_nl: random(most) });
+                    ground.put(
+                        &place,
+                        tick,
+                        Deposit { center, radius, kind, volume_nl: random(most), stamp: None },
+                    );
                 }
                 3 | 4 => ground.rain(&place, tick, random(4)),
                 5 if random(20) == 0 => {
@@ -132,6 +137,7 @@ mod tests {
             radius: [15 * 256; 2],
             kind: MatterKind::Snow,
             volume_nl: 900_000_000,
+            stamp: None,
         };
         ground.put(&place, 1, heavy);
         ground.water.reset();
@@ -151,8 +157,13 @@ mod tests {
         let rests =
             |ground: &Ground, place: &Place| is_at_rest(&ground.water, &ground.matter, &place.weather);
         assert!(rests(&ground, &mild));
-        let whole =
-            Deposit { center: [4096; 2], radius: [31 * 128; 2], kind: MatterKind::Dust, volume_nl: 9_000 };
+        let whole = Deposit {
+            center: [4096; 2],
+            radius: [31 * 128; 2],
+            kind: MatterKind::Dust,
+            volume_nl: 9_000,
+            stamp: None,
+        };
         ground.put(&frost, 1, whole);
         assert!(rests(&ground, &mild));
         ground.put(&frost, 1, Deposit { kind: MatterKind::Snow, ..whole });

@@ -1,7 +1,7 @@
 //! Dust, mud and snow on surfaces, and what water, slopes and warmth do to them.
 //!
 //! Each texel holds three amounts beside its water ([`TexelMatter`]), in the same whole units. Impacts leave [`Deposit`]s,
-//! shared out under their stamps as water is (`settle`). From then on:
+//! shared out by the coverage of their stamps (`settle`). From then on:
 //!
 //! - water takes soil along: drops lift and loosen it, films carry what is loose, drips take it off the surface, and a film that
 //!   dries up leaves a crust ([`wash`]); a jet sweeps it aside ([`jet`]);
@@ -19,6 +19,7 @@ mod advance;
 pub mod jet;
 pub mod look;
 mod settle;
+mod shares;
 pub mod slide;
 pub mod snow;
 mod surface;
@@ -33,7 +34,7 @@ use crate::overlay::Weatherable;
 
 pub(crate) use look::pack_matter;
 pub use look::{GpuTexelMatter, MatterLook};
-pub use settle::Deposit;
+pub use settle::{Deposit, DepositStamp};
 pub use slide::SnowFall;
 pub use surface::{MatterLedger, MatterStock, SurfaceMatter};
 pub use texel::{MatterKind, TexelMatter};

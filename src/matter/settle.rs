@@ -1,16 +1,15 @@
-//! Dust, mud and snow that come: shared out among the texels under their stamps, as water is.
+//! Dust, mud and snow that come: shared out among the texels under their stamps.
 //!
-//! The shares are those of [`soak`](crate::wetting): differences of the stamp's integral, so that a particle's nanolitres are
-//! on the surface to the last, across seams and beside islands, too; nothing of it comes to an island that lies beside in the
-//! image alone. Dust that falls on what is wet is bound there and then;
+//! The shares (`shares.rs`) add up to a particle's nanolitres to the last, across seams and beside islands, too; nothing of it
+//! comes to an island that lies beside in the image alone. Dust that falls on what is wet is bound there and then;
 //! what falls on dry ground, or on snow, stays loose. Snow is `snow`'s to say.
 
+use super::shares::share_out;
 use super::snow::arrive;
 use super::texel::MatterKind;
 use super::wash::bind_dried;
 use super::{MatterScratch, SurfaceMatter};
-use crate::overlay::Splat;
-use crate::overlay::kernel::{axis_coverage, share};
+use crate::overlay::{Splat, StampAtlas};
 use crate::weather::Weather;
 use crate::wetting::{Now, SurfaceWater, texel_under};
 
@@ -26,55 +25,57 @@ const DRY_ON_SNOW_MM: f64 = 0.1;
 /// Matter of an impact, not yet on its surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Deposit {
-    /// Middle of the stamp, 1/256 texel.
+    /// Middle of its patch of the map, 1/256 texel.
     pub center: [i32; 2],
-    /// Half its width and height, 1/256 texel.
+    /// Half the width and height of the patch, 1/256 texel.
     pub radius: [i32; 2],
     /// What it is.
     pub kind: MatterKind,
     /// Nanolitres: of solids without pores, of snow as water.
     pub volume_nl: u32,
+    /// What it is shared out by. None: a round bump as wide as the patch.
+    pub stamp: Option<DepositStamp>,
 }
 
-/// Puts matter on a surface, and makes room for the first.
+/// How a stamp lies over a deposit: as a [`Splat`] that is painted on the map has it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DepositStamp {
+    /// Its number in the [`StampAtlas`]. If there is none of that number, or it covers nothing, a bump takes its place.
+    pub number: u32,
+    /// Half the width and height of the box it may be turned in, 1/256 texel: at least those of the patch.
+    pub radius: [i32; 2],
+    /// From an offset in these radii to the two axes of the stamp, 1/1024.
+    pub rows: [[i32; 2]; 2],
+}
+
+/// Puts matter on a surface, and makes room for the first. `stamps`: those that deposits name.
 pub(crate) fn deposit(
     water: &mut SurfaceWater,
     matter: &mut SurfaceMatter,
     now: &Now,
     weather: &Weather,
     deposit: &Deposit,
+    stamps: Option<&StampAtlas>,
     scratch: &mut MatterScratch,
 ) {
     wake(water, matter, now);
-    let stamp = Splat { center: deposit.center, radius: deposit.radius, ..bytemuck::Zeroable::zeroed() };
+    let patch = Splat { center: deposit.center, radius: deposit.radius, ..bytemuck::Zeroable::zeroed() };
     let (size, wrap) = (water.size, water.wrap);
-    let axes = [stamp.axis(0, size, wrap), stamp.axis(1, size, wrap)];
-    let columns = &mut scratch.columns;
-    columns.clear();
-    columns.extend(stamp.texels(0, size, wrap).map(|x| (x, axis_coverage(axes[0], x as i32))));
     let under = texel_under(deposit.center, size);
     // The texel that was hit.
     let home = now.geometry.stand_in(under).unwrap_or(under);
-    let island = now.geometry.island_to_keep_to(under, stamp.span(0), stamp.span(1));
+    let island = now.geometry.island_to_keep_to(under, patch.span(0), patch.span(1));
     let mut beside = 0;
-    for y in stamp.texels(1, size, wrap) {
-        let in_row = share(deposit.volume_nl, axis_coverage(axes[1], y as i32));
-        for &(x, column) in columns.iter() {
-            let nl = share(in_row, column);
-            if nl == 0 {
-                continue;
-            }
-            let over = y * size + x;
-            let texel = match island {
-                None => now.geometry.stand_in(over),
-                Some(island) => Some(now.geometry.on_island(island, over, home)),
-            };
-            match texel {
-                Some(texel) => put(water, matter, now, weather, deposit.kind, texel, nl),
-                None => beside += nl,
-            }
+    share_out(deposit, stamps, (size, wrap), &mut scratch.shares, |over, nl| {
+        let texel = match island {
+            None => now.geometry.stand_in(over),
+            Some(island) => Some(now.geometry.on_island(island, over, home)),
+        };
+        match texel {
+            Some(texel) => put(water, matter, now, weather, deposit.kind, texel, nl),
+            None => beside += nl,
         }
-    }
+    });
     if beside > 0 {
         put(water, matter, now, weather, deposit.kind, home, beside);
     }
@@ -138,7 +139,7 @@ mod tests {
     use std::sync::Arc;
 
     fn stamp(kind: MatterKind, volume_nl: u32) -> Deposit {
-        Deposit { center: [8 * 256; 2], radius: [3 * 256, 2 * 256], kind, volume_nl }
+        Deposit { center: [8 * 256; 2], radius: [3 * 256, 2 * 256], kind, volume_nl, stamp: None }
     }
 
     #[test]
@@ -231,18 +232,15 @@ mod tests {
                     let freezing = place.clone().with(|weather| weather.temperature_c = -4.0);
                     let mut ground = Ground::dry(&freezing);
                     let center = [column * 256 + 130, 20 * 256];
-                    ground.put(
-                        &freezing,
-                        1,
-                        Deposit { center, radius: [radius * 256; 2], kind, volume_nl: 10_007 },
-                    );
+                    let radius = [radius * 256; 2];
+                    ground.put(&freezing, 1, Deposit { center, radius, ..stamp(kind, 10_007) });
                     let lies = |texel: &TexelMatter| texel.soil() + u64::from(texel.snow);
                     let texels = (0u32..).zip(&ground.matter.texels);
                     let here: u64 = texels
                         .filter(|&(texel, _)| on_right(texel) == is_right)
                         .map(|(_, matter)| lies(matter))
                         .sum();
-                    assert_eq!(here, ground.water.units.from_nl(10_007), "{kind:?} {column} {radius}");
+                    assert_eq!(here, ground.water.units.from_nl(10_007), "{kind:?} {column} {radius:?}");
                 }
             }
         }

@@ -118,7 +118,7 @@ impl Ground {
 
     pub(super) fn put(&mut self, place: &Place, tick: u32, what: Deposit) {
         let (water, matter) = (&mut self.water, &mut self.matter);
-        deposit(water, matter, &place.now(tick), &place.weather, &what, &mut self.scratch);
+        deposit(water, matter, &place.now(tick), &place.weather, &what, None, &mut self.scratch);
     }
 
     /// So many drops of 2 mm, all over.

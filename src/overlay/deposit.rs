@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::frames::{FramesWork, SurfaceFrames, measure_frames, release_frames};
 use super::site::Site;
-use super::stamping::{patch_radius, splat_from_impact, unit_hash};
+use super::stamping::{Mark, deposit_stamp, patch_radius, splat_from_impact, unit_hash};
 use super::{MapLoss, MapSize, SizeMaps, Splat, StampAtlas, StampSpace, TexelArea, Weatherable, pool};
 use crate::clock::WeatheringClock;
 use crate::collision::{DeformingCollider, Impact, Impacts, SurfaceCollider};
@@ -204,14 +204,17 @@ pub(super) fn deposit_splats(
         let site = frames
             .zip(transform)
             .and_then(|(frames, transform)| Site::of(impact, &frames.0, transform, deforming));
-        let splat = splat_from_impact(impact, row, effect, map, site.as_ref(), clock.tick(), water_nl);
+        let mark = Mark::of(impact, row, effect);
+        let splat =
+            splat_from_impact(impact, row, effect, mark, map, site.as_ref(), (clock.tick(), water_nl));
         queue.push(splat);
-        let (center, radius) = (splat.center, patch_radius(impact, row, effect, size.texels()));
+        let (center, radius) = (splat.center, patch_radius(impact, mark, size.texels()));
         if let Some(mut matter) = matter
             && let Some(kind) = kind_of(effect.carries)
             && solid_nl > 0
         {
-            matter.0.push(Deposit { center, radius, kind, volume_nl: solid_nl });
+            let stamp = deposit_stamp(impact, row, effect, mark, size.texels());
+            matter.0.push(Deposit { center, radius, kind, volume_nl: solid_nl, stamp });
         }
         if let Some(mut drops) = drops
             && splat.water_nl > 0
@@ -346,7 +349,8 @@ mod tests {
         clock.advance();
         world.insert_resource(clock);
         let mut effects = EffectTable::default();
-        effects.insert(Handle::default(), WeatherEffect { stamp_radius: Some(0.125), ..default() });
+        let at_any_speed = WeatherEffect { stamp_radius: Some(0.125), stamp_speed: Some(0.0), ..default() };
+        effects.insert(Handle::default(), at_any_speed);
         world.insert_resource(effects);
         world.init_resource::<ParticleConfig>();
         world.init_resource::<Particles>();

@@ -12,6 +12,7 @@ use crate::collision::Impact;
 use crate::effect::drops::{drop_mm3, spread_mm};
 use crate::effect::{EffectRow, StampTurn, WeatherEffect};
 use crate::material::film::ripples::pcg;
+use crate::matter::DepositStamp;
 
 /// A drop of diameter d spreads to `d We^1/4`; We grows with d, and d with the cube root of the volume.
 const SPREAD_BY_VOLUME: f32 = 5.0 / 12.0;
@@ -19,12 +20,17 @@ const SPREAD_BY_VOLUME: f32 = 5.0 / 12.0;
 /// Radius of the mark of an impact, metres, before it is drawn out.
 fn radius(impact: &Impact, effect: &WeatherEffect, row: &EffectRow) -> f32 {
     let volume_mm3 = impact.volume_nl as f32 * 1e-3;
+    let speed = impact.velocity.dot(impact.normal).abs();
     let own = match effect.stamp_radius {
-        Some(radius) => radius * (volume_mm3 / effect.volume_mm3).min(1.0).powf(SPREAD_BY_VOLUME),
+        Some(radius) => {
+            let part = volume_mm3 / effect.volume_mm3;
+            // Most particles carry what the effect says, or more.
+            let by_volume = if part < 1.0 { part.powf(SPREAD_BY_VOLUME) } else { 1.0 };
+            radius * by_volume * row.width_by_speed(speed)
+        }
         None => {
             let diameter = row.diameters_mm[usize::from(impact.class)];
             let drops = (volume_mm3 / drop_mm3(diameter)).max(1.0);
-            let speed = impact.velocity.dot(impact.normal).abs();
             0.5e-3 * spread_mm(diameter, speed) * drops.sqrt()
         }
     };
@@ -37,12 +43,27 @@ fn stretch(impact: &Impact, effect: &WeatherEffect) -> f32 {
     (1.0 / steepness.max(0.05)).min(1.0 + effect.stamp_stretch)
 }
 
+/// How large the mark of an impact is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mark {
+    /// Radius before it is drawn out, metres.
+    radius: f32,
+    /// How much longer than wide, 1 or more.
+    stretch: f32,
+}
+
+impl Mark {
+    pub(super) fn of(impact: &Impact, row: &EffectRow, effect: &WeatherEffect) -> Self {
+        Self { radius: radius(impact, effect, row), stretch: stretch(impact, effect) }
+    }
+}
+
 /// Half the width and height, 1/256 texel, of the patch of a map with `size` texels along each side over which an impact's water,
 /// dust or snow is shared out: of the box around its mark. The mark is an ellipse, the patch lies straight on the map: so it is
 /// drawn out as the mark is where that lies along u or v, and wider than it in between.
-pub(super) fn patch_radius(impact: &Impact, row: &EffectRow, effect: &WeatherEffect, size: u32) -> [i32; 2] {
-    let own = radius(impact, effect, row);
-    let long = own * stretch(impact, effect);
+pub(super) fn patch_radius(impact: &Impact, mark: Mark, size: u32) -> [i32; 2] {
+    let own = mark.radius;
+    let long = own * mark.stretch;
     let flight = impact.velocity.reject_from(impact.normal).normalize_or_zero();
     let reach = impact.along.map(|axis| {
         let along = flight.dot(axis).clamp(-1.0, 1.0).powi(2);
@@ -77,6 +98,48 @@ impl Axes {
         };
         Self { s: t.cross(front), t, n: front }
     }
+
+    /// Those that lie in the surface, for a mark that is longer than wide along its flight: across it is narrower.
+    fn drawn_out(&self, impact: &Impact, stretch: f32) -> [Vec3; 2] {
+        let flight = impact.velocity.reject_from(self.n).normalize_or_zero();
+        [self.s, self.t].map(|axis| {
+            let along = flight * axis.dot(flight);
+            along + (axis - along) * stretch
+        })
+    }
+}
+
+/// The front of the surface, on which the map lies.
+fn front(impact: &Impact) -> Vec3 {
+    if impact.back { -impact.normal } else { impact.normal }
+}
+
+/// The number of the stamp of an impact, for a mark with this radius on the map; none of a dome.
+fn stamp_number(impact: &Impact, row: &EffectRow, radius: [i32; 2], stretch: f32) -> Option<u32> {
+    let (first, count @ 1..) = row.stamps else { return None };
+    let variant = pcg(impact.sequence.0 ^ 0x5bd1_e995) % count;
+    Some(StampAtlas::number(first, variant, radius, stretch))
+}
+
+/// An axis of a stamp on the map: along u and v, 1/1024.
+fn row_on_map(axis: Vec3, impact: &Impact) -> [i32; 2] {
+    impact.along.map(|along| (axis.dot(along) * 1024.0).round() as i32)
+}
+
+/// How the stamp of an impact lies on a map of this size, as if it were painted there: its matter is shared out by it. None of a
+/// dome.
+pub(super) fn deposit_stamp(
+    impact: &Impact,
+    row: &EffectRow,
+    effect: &WeatherEffect,
+    mark: Mark,
+    size: u32,
+) -> Option<DepositStamp> {
+    let radius = Splat::radius_from_uv(impact.uv_per_metre * (mark.radius * mark.stretch), size);
+    let number = stamp_number(impact, row, radius, mark.stretch)?;
+    let axes = Axes::new(impact, effect.stamp_turn, front(impact));
+    let rows = axes.drawn_out(impact, mark.stretch).map(|axis| row_on_map(axis, impact));
+    Some(DepositStamp { number, radius, rows })
 }
 
 /// The stamp of an impact, on maps of this size with these edges.
@@ -84,14 +147,13 @@ pub(super) fn splat_from_impact(
     impact: &Impact,
     row: &EffectRow,
     effect: &WeatherEffect,
+    mark: Mark,
     (size, wrap): (u32, [Wrap; 2]),
     site: Option<&Site>,
-    tick: u32,
-    water_nl: u32,
+    (tick, water_nl): (u32, u32),
 ) -> Splat {
-    let own = radius(impact, effect, row);
-    let stretch = stretch(impact, effect);
-    let long = own * stretch;
+    let stretch = mark.stretch;
+    let long = mark.radius * stretch;
     let [r, g, b] = effect.diffuse.color;
     let [reflectance, smoothness, unused] = effect.specular.color;
     let mut splat = Splat {
@@ -105,20 +167,12 @@ pub(super) fn splat_from_impact(
         bump_opacity: if effect.bump == 0.0 { 0 } else { 255 },
         ..Zeroable::zeroed()
     };
-    if let (first, count @ 1..) = row.stamps {
-        let variant = pcg(impact.sequence.0 ^ 0x5bd1_e995) % count;
-        splat.stamp = StampAtlas::number(first, variant, splat.radius, stretch);
+    // Without paint any shape will do, and the plainest is the fastest.
+    if effect.paints() {
+        splat.stamp = stamp_number(impact, row, splat.radius, stretch).unwrap_or(0);
     }
-    // The map lies on the front.
-    let front = if impact.back { -impact.normal } else { impact.normal };
-    let axes = Axes::new(impact, effect.stamp_turn, front);
-    let flight = impact.velocity.reject_from(front).normalize_or_zero();
-    // Across the flight it is narrower than along it.
-    let drawn_out = |axis: Vec3| {
-        let along = flight * axis.dot(flight);
-        along + (axis - along) * stretch
-    };
-    let (s, t) = (drawn_out(axes.s), drawn_out(axes.t));
+    let axes = Axes::new(impact, effect.stamp_turn, front(impact));
+    let [s, t] = axes.drawn_out(impact, stretch);
     match site {
         Some(site) if effect.paints() => {
             // Never so small that it falls between texels.
@@ -126,10 +180,11 @@ pub(super) fn splat_from_impact(
             lay_in_space(&mut splat, site, [s, t, axes.n], &axes, long.max(0.75 * pitch));
         }
         _ => {
-            let [u, v] = impact.along;
-            let on_map =
-                |axis: Vec3| [axis.dot(u), axis.dot(v), 0.0].map(|part| (part * 1024.0).round() as i32);
-            (splat.row_s, splat.row_t) = (on_map(s), on_map(t));
+            let row = |axis: Vec3| {
+                let [along_u, along_v] = row_on_map(axis, impact);
+                [along_u, along_v, 0]
+            };
+            (splat.row_s, splat.row_t) = (row(s), row(t));
         }
     }
     splat
@@ -192,8 +247,9 @@ mod tests {
     use super::super::frames::Frames;
     use super::*;
     use crate::collision::MeshTriangles;
-    use crate::effect::{EffectIndex, EffectTable};
+    use crate::effect::{Carries, EffectIndex, EffectTable, Paint, ShippedEffect, StampSource};
     use crate::particle::Sequence;
+    use crate::stamps::StampKind;
     use crate::wetting::TexelGeometry;
 
     fn impact(velocity: Vec3) -> Impact {
@@ -219,12 +275,13 @@ mod tests {
         table.insert(Handle::default(), effect);
         let row = &table.rows()[0];
         let effect = row.effect.as_ref().unwrap();
-        splat_from_impact(impact, row, effect, (64, [Wrap::Clamp; 2]), site, 1, impact.volume_nl)
+        let mark = Mark::of(impact, row, effect);
+        splat_from_impact(impact, row, effect, mark, (64, [Wrap::Clamp; 2]), site, (1, impact.volume_nl))
     }
 
     fn paint(stamp_radius: f32) -> WeatherEffect {
-        let diffuse = crate::effect::Paint { opacity: 1.0, ..default() };
-        WeatherEffect { stamp_radius: Some(stamp_radius), diffuse, ..default() }
+        let diffuse = Paint { opacity: 1.0, ..default() };
+        WeatherEffect { stamp_radius: Some(stamp_radius), stamp_speed: Some(0.0), diffuse, ..default() }
     }
 
     #[test]
@@ -242,6 +299,70 @@ mod tests {
         let many = Impact { volume_nl: 4189 * 10_000, ..straight };
         let radius = splat(&many, drops, None).radius[0] as f32 / 256.0 / 32.0;
         assert!((0.5..0.65).contains(&radius), "{radius} m");
+    }
+
+    #[test]
+    fn at_a_quarter_of_the_speed_a_mark_of_as_much_water_is_half_as_wide() {
+        let shipped = ShippedEffect::ALL.map(|shipped| (shipped.name, shipped.read().unwrap()));
+        for (name, effect) in shipped.into_iter().chain([("as drops spread", WeatherEffect::default())]) {
+            let spreads = matches!(effect.carries, Carries::Water | Carries::Mud(_));
+            let volume_nl = (effect.volume_mm3 * 1000.0) as u32;
+            let mut table = EffectTable::default();
+            table.insert(Handle::default(), effect);
+            let row = &table.rows()[0];
+            let radius = |velocity: Vec3| {
+                let impact = Impact { volume_nl, ..impact(velocity) };
+                Mark::of(&impact, row, row.effect.as_ref().unwrap()).radius
+            };
+            // What lies along the surface does not count.
+            let part = radius(Vec3::new(3.0, -1.5, 0.0)) / radius(Vec3::NEG_Y * 6.0);
+            let expected = if spreads { 0.5 } else { 1.0 };
+            assert!((part - expected).abs() < 1e-3, "{name}: {part}");
+        }
+    }
+
+    #[test]
+    fn shipped_marks_are_about_as_large_as_their_drops_spread() {
+        // The hose's slugs are 2.7 drops of 4 mm, a drip is one of 3.6 mm.
+        let hose = ShippedEffect::named("hose").unwrap().read().unwrap();
+        for (effect, diameter) in [(hose, 4.0), (crate::wetting::drip_effect(), 3.63)] {
+            let drops = effect.volume_mm3 / drop_mm3(diameter);
+            let spread = 0.5e-3 * spread_mm(diameter, effect.stamp_speed.unwrap()) * drops.sqrt();
+            let part = effect.stamp_radius.unwrap() / spread;
+            assert!((part - 1.0).abs() < 0.06, "{part}");
+        }
+    }
+
+    #[test]
+    fn matter_is_shared_out_by_the_stamp_that_is_painted() {
+        let aslant = impact(Vec3::new(3.0, -1.0, 0.5));
+        let stamps = StampSource::Kind(StampKind::Splat);
+        let painted = WeatherEffect { stamps, stamp_stretch: 1.0, ..paint(0.25) };
+        let bare = WeatherEffect { diffuse: Paint::default(), ..painted.clone() };
+        let mut atlas = StampAtlas::default();
+        let mut both = |effect: WeatherEffect| {
+            let mut table = EffectTable::default();
+            table.insert(Handle::default(), effect);
+            for (numbers, set) in table.without_stamps() {
+                *numbers = (atlas.add(set).unwrap(), set.variants.len() as u32);
+            }
+            let row = &table.rows()[0];
+            let effect = row.effect.as_ref().unwrap();
+            let mark = Mark::of(&aslant, row, effect);
+            let map = (64, [Wrap::Clamp; 2]);
+            let splat = splat_from_impact(&aslant, row, effect, mark, map, None, (1, aslant.volume_nl));
+            (splat, deposit_stamp(&aslant, row, effect, mark, 64))
+        };
+        let (splat, lies) = both(painted);
+        let lies = lies.unwrap();
+        assert!(splat.stamp > 0);
+        assert_eq!((lies.number, lies.radius), (splat.stamp, splat.radius));
+        assert_eq!(lies.rows, [splat.row_s, splat.row_t].map(|[along_u, along_v, _]| [along_u, along_v]));
+        // What paints nothing has its shape, too, but painters are not told.
+        let (splat, unpainted) = both(bare.clone());
+        assert_eq!((splat.stamp, unpainted), (0, Some(lies)));
+        let (_, dome) = both(WeatherEffect { stamps: StampSource::Dome, ..bare });
+        assert_eq!(dome, None);
     }
 
     #[test]
@@ -263,7 +384,8 @@ mod tests {
         let row = &table.rows()[0];
         let patch = |velocity: Vec3| {
             let effect = row.effect.as_ref().unwrap();
-            patch_radius(&impact(velocity), row, effect, 64).map(|radius| radius as f32 / 256.0)
+            let impact = impact(velocity);
+            patch_radius(&impact, Mark::of(&impact, row, effect), 64).map(|radius| radius as f32 / 256.0)
         };
         assert_eq!(patch(Vec3::NEG_Y), [8.0; 2]);
         assert_eq!(patch(Vec3::new(3.0, -1.0, 0.0)), [16.0, 8.0]);

@@ -50,6 +50,8 @@ pub fn drip_effect() -> WeatherEffect {
         volume_mm3: 25.0,
         terminal_speed: Some(8.3),
         stamp_radius: Some(0.011),
+        // To which a drop of that size spreads at that speed, of a fall of 1.3 m.
+        stamp_speed: Some(5.0),
         stamp_radius_jitter: 0.3,
         ..default()
     }

@@ -15,6 +15,7 @@ use crate::material::PorousMaterial;
 use crate::matter::{
     FallingSnow, MatterQueue, MatterScratch, SurfaceMatter, advance_matter, deposit, is_at_rest,
 };
+use crate::overlay::StampAtlas;
 use crate::particle::for_each_chunk;
 use crate::weather::{DryingClock, Weather};
 
@@ -93,6 +94,7 @@ pub(super) fn advance_water(
     drying: Res<DryingClock>,
     weather: Res<Weather>,
     stats: Res<WettingStats>,
+    atlas: Option<Res<StampAtlas>>,
     scratch: Local<Parallel<Scratch>>,
     mut memory: Local<Vec<SurfaceItem<'static, 'static>>>,
     mut surfaces: Query<Surface>,
@@ -107,6 +109,7 @@ pub(super) fn advance_water(
     let mut busy: Vec<SurfaceItem> = reused(std::mem::take(&mut *memory));
     busy.extend(surfaces.iter_mut().filter(is_busy));
     let default = PorousMaterial::default();
+    let stamps = atlas.as_deref();
     let advance = |scratch: &mut Scratch,
                    (
         mut water,
@@ -130,7 +133,7 @@ pub(super) fn advance_water(
         }
         // Dust first: what falls on dry ground in a tick is wetted by the drops of that tick, whatever their order.
         for matter_of_impact in &deposits.0 {
-            deposit(water, matter, &now, &weather, matter_of_impact, &mut scratch.matter);
+            deposit(water, matter, &now, &weather, matter_of_impact, stamps, &mut scratch.matter);
         }
         stats.deposits.fetch_add(deposits.0.len() as u64, Ordering::Relaxed);
         deposits.0.clear();

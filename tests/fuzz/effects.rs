@@ -21,6 +21,7 @@ const IMAGES: &str = r#"(
     jet: true,
     stamps: Images(diffuse: "stamp.png", specular: None, normal: "stamp.png", variants: 4),
     stamp_radius: 0.02,
+    stamp_speed: 5.0,
     stamp_turn: Flight,
     stamp_stretch: 2.0,
     diffuse: (color: (0.3, 0.2, 0.1), opacity: 0.5),

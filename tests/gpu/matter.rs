@@ -69,7 +69,7 @@ impl Scene {
         let (center, radius) = ([MIDDLE as i32 * 256; 2], [radius * 256; 2]);
         let volume_nl = (litres * 1e9) as u32;
         let mut queue = self.app.world_mut().get_mut::<MatterQueue>(self.surface).unwrap();
-        queue.0.push(Deposit { center, radius, kind, volume_nl });
+        queue.0.push(Deposit { center, radius, kind, volume_nl, stamp: None });
         self.app.insert_resource(TimeUpdateStrategy::FixedTimesteps(2));
         update(&mut self.app);
         update(&mut self.app);

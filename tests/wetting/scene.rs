@@ -76,6 +76,7 @@ impl Scene {
         let effect = WeatherEffect {
             volume_mm3: water_mm3,
             stamp_radius: Some(stamp_radius),
+            stamp_speed: Some(0.0),
             terminal_speed: Some(6.5),
             ..default()
         };

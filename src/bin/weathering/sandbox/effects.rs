@@ -178,6 +178,9 @@ fn edit(ui: &mut egui::Ui, effect: &mut WeatherEffect) {
     }
     if let Some(radius) = &mut effect.stamp_radius {
         number(ui, "radius, m", radius, (0.001, 1.0), "Of a particle with the volume above");
+        if matches!(effect.carries, Carries::Water | Carries::Mud(_)) {
+            stamp_speed(ui, &mut effect.stamp_speed);
+        }
     }
     number(ui, "jitter", &mut effect.stamp_radius_jitter, (0.0, 0.9), "Radius times 1 plus or minus this");
     number(ui, "stretch", &mut effect.stamp_stretch, (0.0, 7.0), "How much longer than wide, aslant");
@@ -207,6 +210,19 @@ fn edit(ui: &mut egui::Ui, effect: &mut WeatherEffect) {
     number(ui, "width, m", &mut effect.look.width, (0.0, 0.1), "Of the streak");
     number(ui, "exposure, s", &mut effect.look.exposure, (0.0, 0.1), "How long the shutter is open");
     number(ui, "crown, m", &mut effect.look.splash, (0.0, 0.2), "Height of the splash");
+}
+
+/// At which speed marks are as large as the effect says.
+fn stamp_speed(ui: &mut egui::Ui, speed: &mut Option<f32>) {
+    let mut is_given = speed.is_some();
+    if ui.checkbox(&mut is_given, "at a speed of its own").changed() {
+        *speed = is_given.then_some(5.0);
+    }
+    if let Some(speed) = speed {
+        let what =
+            "Straight at the surface: at a quarter of it the radius is half; 0 is the same at any speed";
+        number(ui, "at v, m/s", speed, (0.0, 100.0), what);
+    }
 }
 
 /// One of some values, by their names.
