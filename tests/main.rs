@@ -42,6 +42,8 @@ mod gpu {
     pub mod app;
     /// Shaders that do not compile.
     mod broken;
+    /// What a picture shows on either side of each edge of a mesh.
+    mod edges;
     /// Exported scenes in a renderer that knows nothing of weathering.
     mod exported;
     /// Ticks and frames.
@@ -65,6 +67,8 @@ mod gpu {
     mod particles;
     /// Lights, cameras, meshes.
     mod places;
+    /// Borders of uv islands, as they are drawn.
+    mod seams;
     /// Painting.
     mod splat;
     /// Floods, ripples, light through cloth.

@@ -16,14 +16,23 @@ use bevy_weathering::wetting::{WetGeometry, surface_points};
 
 use crate::wetting::scene::Scene;
 
-const SIZE: u32 = 512;
+/// Texels along each side of the bunny's maps.
+pub const SIZE: u32 = 512;
 
-fn bunny() -> MeshTriangles {
+/// The middle of the bunny.
+pub const MIDDLE: Vec3 = Vec3::new(0.0, 0.45, 0.0);
+
+/// Where what is thrown at it comes from.
+const SIDES: [Vec3; 5] = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::Z, Vec3::NEG_Z];
+
+/// The bunny of 5,648 triangles.
+pub fn bunny() -> MeshTriangles {
     let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models/bunny.glb");
     read_first_primitive(&file).unwrap()
 }
 
-fn mesh_of(triangles: &MeshTriangles) -> Mesh {
+/// Its positions and texture coordinates, three vertices for each triangle.
+pub fn mesh_of(triangles: &MeshTriangles) -> Mesh {
     let positions: Vec<[f32; 3]> = triangles.positions.iter().flatten().map(|at| at.to_array()).collect();
     let uvs: Vec<[f32; 2]> = triangles.uvs.iter().flatten().map(|uv| uv.to_array()).collect();
     Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
@@ -44,7 +53,7 @@ fn muddy(stamps: StampSpace, kind: StampSource) -> CpuMaps {
         ..default()
     };
     let effect = world.resource_mut::<Assets<WeatherEffect>>().add(effect.with_stamps().unwrap());
-    throw_from_all_sides(world, &effect, 60.0);
+    throw(world, &SIDES, MIDDLE, &effect, 60.0);
     let surface = scene.surface(mesh_of(&bunny()), SIZE, PorousMaterial::default(), Transform::default());
     scene.0.world_mut().get_mut::<Weatherable>(surface).unwrap().stamps = stamps;
     // The effect is asked for in the first tick; then the frames are measured.
@@ -56,10 +65,10 @@ fn muddy(stamps: StampSpace, kind: StampSource) -> CpuMaps {
     scene.0.world().get::<CpuMaps>(surface).unwrap().clone()
 }
 
-/// So many particles a second at the bunny, from each of five sides.
-fn throw_from_all_sides(world: &mut World, effect: &Handle<WeatherEffect>, rate: f32) {
-    for (stream, from) in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::Z, Vec3::NEG_Z].into_iter().enumerate() {
-        let place = Transform::from_translation(Vec3::Y * 0.45 + from * 2.0);
+/// So many particles a second from each of these sides, at what stands around this place.
+pub fn throw(world: &mut World, sides: &[Vec3], at: Vec3, effect: &Handle<WeatherEffect>, rate: f32) {
+    for (stream, &from) in sides.iter().enumerate() {
+        let place = Transform::from_translation(at + from * 2.0);
         let up = if from.y == 0.0 { Vec3::Y } else { Vec3::X };
         let emitter = Emitter {
             effect: effect.clone(),
@@ -69,7 +78,7 @@ fn throw_from_all_sides(world: &mut World, effect: &Handle<WeatherEffect>, rate:
             stream: stream as u32,
             ..default()
         };
-        world.spawn((emitter, place.looking_at(Vec3::Y * 0.45, up)));
+        world.spawn((emitter, place.looking_at(at, up)));
     }
 }
 
@@ -86,29 +95,39 @@ fn coverage(maps: &CpuMaps, uv: Vec2) -> f32 {
 }
 
 /// An edge of a triangle.
-struct Border {
+pub struct Border {
+    /// The triangle.
+    pub triangle: usize,
     /// Its ends.
     on_map: [Vec2; 2],
     /// The same in space.
-    in_space: [Vec3; 2],
+    pub in_space: [Vec3; 2],
     /// The triangle's other corner on the map.
     third: Vec2,
 }
 
-/// Edges that two triangles share in space, and not on the map, as each of both has them.
-fn seams(triangles: &MeshTriangles) -> Vec<[Border; 2]> {
+/// Edges that two triangles share in space, as each of both has them: from the same end to the same end.
+pub fn edges(triangles: &MeshTriangles) -> Vec<[Border; 2]> {
     let mut edges: BTreeMap<[[u32; 3]; 2], Vec<Border>> = BTreeMap::new();
-    for (corners, uvs) in triangles.positions.iter().zip(&triangles.uvs) {
+    for (triangle, (corners, uvs)) in triangles.positions.iter().zip(&triangles.uvs).enumerate() {
         for (from, to, third) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
             let bits = |corner: usize| (corners[corner] + Vec3::ZERO).to_array().map(f32::to_bits);
             let (from, to) = if bits(from) > bits(to) { (to, from) } else { (from, to) };
             let ends = [bits(from), bits(to)];
             let (on_map, in_space) = ([uvs[from], uvs[to]], [corners[from], corners[to]]);
-            edges.entry(ends).or_default().push(Border { on_map, in_space, third: uvs[third] });
+            edges.entry(ends).or_default().push(Border { triangle, on_map, in_space, third: uvs[third] });
         }
     }
-    let pairs = edges.into_values().filter_map(|sides| <[_; 2]>::try_from(sides).ok());
-    pairs.filter(|[a, b]| a.on_map != b.on_map).collect()
+    edges.into_values().filter_map(|sides| <[_; 2]>::try_from(sides).ok()).collect()
+}
+
+/// Whether its two triangles do not share it on the map.
+pub fn is_seam([a, b]: &[Border; 2]) -> bool {
+    a.on_map != b.on_map
+}
+
+fn seams(triangles: &MeshTriangles) -> Vec<[Border; 2]> {
+    edges(triangles).into_iter().filter(is_seam).collect()
 }
 
 /// Mean difference of coverage over all seams, and the part of their points with a difference that can be seen.
@@ -160,7 +179,7 @@ fn the_bunny_is_as_wet_on_one_side_of_a_seam_as_on_the_other() {
     };
     let world = scene.0.world_mut();
     let effect = world.resource_mut::<Assets<WeatherEffect>>().add(effect);
-    throw_from_all_sides(world, &effect, 200.0);
+    throw(world, &SIDES, MIDDLE, &effect, 200.0);
     // Takes up nothing, and lets nothing run.
     let glazed = PorousMaterial { capacity_mm: 0.0, retained_mm: 1000.0, ..default() };
     let surface = scene.surface(mesh_of(&bunny()), SIZE, glazed, Transform::default());
@@ -197,7 +216,7 @@ fn the_bunny_is_as_wet_on_one_side_of_a_seam_as_on_the_other() {
         for step in 0..8 {
             let part = (step as f32 + 0.5) / 8.0;
             let depths_of = [0, 1].map(|side: usize| {
-                let Border { on_map: [from, to], in_space: [start, end], third } = sides[side];
+                let Border { on_map: [from, to], in_space: [start, end], third, .. } = sides[side];
                 let at = from.lerp(to, part);
                 // A texel and a half inside.
                 let inside = at + (third - at).clamp_length_max(1.5 / SIZE as f32);
