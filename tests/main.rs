@@ -65,6 +65,8 @@ mod gpu {
     mod particles;
     /// Lights, cameras, meshes.
     mod places;
+    /// Maps of another size.
+    mod resize;
     /// Painting.
     mod splat;
     /// Floods, ripples, light through cloth.

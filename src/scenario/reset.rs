@@ -7,7 +7,10 @@ use super::timeline::rewind;
 use crate::clock::WeatheringClock;
 use crate::emitter::{Emitter, EmitterState, NewParticles};
 use crate::matter::{FallingSnow, MatterQueue, SurfaceMatter};
-use crate::overlay::{CpuMaps, MapLoss, Overlays, SplatQueue, SurfaceTotals, SurfaceTraces, Weatherable};
+use crate::overlay::{
+    CpuMaps, MapLoss, MapSize, Overlays, SplatQueue, SurfaceTotals, SurfaceTraces, Weatherable,
+    put_first_size,
+};
 use crate::particle::{ParticleCounts, Particles, Splashes, WaterCounts};
 use crate::weather::DryingClock;
 use crate::wetting::{DropQueue, ExposureProgress, SurfaceWater, forget_poses};
@@ -58,6 +61,11 @@ pub fn reset_scenario(world: &mut World) {
     let mut mapped = world.query_filtered::<Entity, With<Overlays>>();
     for surface in mapped.iter(world).collect::<Vec<_>>() {
         world.entity_mut(surface).remove::<Overlays>();
+    }
+    // Where the budget is short, sizes have followed what was hit.
+    let mut sized = world.query_filtered::<Entity, With<MapSize>>();
+    for surface in sized.iter(world).collect::<Vec<_>>() {
+        put_first_size(world, surface);
     }
     world.resource_mut::<NewParticles>().restart();
     world.resource_mut::<WeatheringClock>().reset();
