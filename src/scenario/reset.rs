@@ -90,7 +90,9 @@ mod tests {
 
     use super::super::test_app::{app, run_ticks, wait};
     use super::*;
+    use crate::overlay::put_size;
     use crate::scenario::{Scenario, scene_digest};
+    use crate::wetting::MeasureTiming;
 
     const TAP: &str = r#"(
         seconds: 3.0,
@@ -151,6 +153,32 @@ mod tests {
         // A frame without a tick, in which everybody sees that it is clean again.
         app.update();
         assert_eq!(traces(&mut app), SurfaceTraces::default());
+        assert_eq!(run(&mut app), first);
+    }
+
+    #[test]
+    fn surfaces_get_the_maps_back_that_they_began_with() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut app = tap(folder.path());
+        // Its exposure is there before the first tick, however long that takes.
+        app.insert_resource(MeasureTiming::AfterTicks(5));
+        let first = run(&mut app);
+        let size = |app: &mut App| {
+            let world = app.world_mut();
+            let mut surfaces = world.query::<(Entity, &MapSize, &SurfaceWater)>();
+            let (surface, map, water) = surfaces.single(world).unwrap();
+            (surface, map.texels(), water.size())
+        };
+        reset_scenario(app.world_mut());
+        let (surface, ..) = size(&mut app);
+        // As a saved scene in which it has given way.
+        put_size(app.world_mut(), surface, 16);
+        assert_eq!(size(&mut app), (surface, 16, 16));
+        app.update();
+        assert_ne!(run(&mut app).0, first.0);
+        reset_scenario(app.world_mut());
+        assert_eq!(size(&mut app), (surface, 32, 32));
+        app.update();
         assert_eq!(run(&mut app), first);
     }
 }

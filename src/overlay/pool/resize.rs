@@ -241,12 +241,14 @@ pub(crate) fn put_size(world: &mut World, surface: Entity, to: u32) {
     entity.insert((WetGeometry(Arc::new(geometry)), Measured::elsewhere(to, wrap, bvh, affine.matrix3)));
 }
 
-/// Gives a clean surface the maps back that it was given first, as [`put_size`] does.
+/// Gives a clean surface the maps back that it was given first, as [`put_size`] does. Its exposure is looked for anew: what it had has
+/// become coarser on the way.
 pub(crate) fn put_first_size(world: &mut World, surface: Entity) {
-    if let Ok(mut entity) = world.get_entity_mut(surface) {
-        entity.remove::<Resizing>();
-    }
-    if let Some(first) = world.get::<MapSize>(surface).map(|size| size.granted) {
-        put_size(world, surface, first);
+    let Ok(mut entity) = world.get_entity_mut(surface) else { return };
+    entity.remove::<Resizing>();
+    let Some(&size) = entity.get::<MapSize>() else { return };
+    if size.texels != size.granted {
+        put_size(world, surface, size.granted);
+        world.entity_mut(surface).remove::<Exposure>();
     }
 }
