@@ -97,8 +97,11 @@ impl Mix {
             (self.wettest, self.most) = (texel, held.total());
         }
         self.count += 1;
-        self.shown += u32::from(held.shown);
-        self.filmed += u32::from(held.filmed);
+        // How a dry texel looked when it was last wet is not seen any more.
+        if !held.is_dry() {
+            self.shown += u32::from(held.shown);
+            self.filmed += u32::from(held.filmed);
+        }
         self.marks.efflorescence += marks.efflorescence;
         self.marks.tide += marks.tide;
     }
@@ -284,8 +287,8 @@ mod tests {
                     assert!(water.is_dry() || (new.lies(texel) && water.tick > 0), "{from} to {to}: {texel}");
                 }
                 let is_dirty = |texel: u32| after.tiles.has(after.tile_of(texel), Tiles::DIRTY);
-                let wet = (0u32..).zip(&after.texels).filter(|(_, water)| !water.is_dry());
-                assert!(wet.into_iter().all(|(texel, _)| is_dirty(texel)));
+                let mut wet = (0u32..).zip(&after.texels).filter(|(_, water)| !water.is_dry());
+                assert!(wet.all(|(texel, _)| is_dirty(texel)));
                 assert!(after.tiles.running.is_sorted() && after.tiles.spreading.is_sorted());
             }
         }
@@ -309,7 +312,7 @@ mod tests {
         before.ledger.received = 51;
         let after = before.resized(&old, &new);
         let expected =
-            TexelWater { film: 35, pores: 16, tick: 33, shown: 100, filmed: 60, reserve: 77, rim: 0 };
+            TexelWater { film: 35, pores: 16, tick: 33, shown: 75, filmed: 45, reserve: 77, rim: 0 };
         assert_eq!(after.texels[0], expected);
         assert_eq!(after.marks[0], Marks { efflorescence: 0.25, tide: 0.1 });
         assert_eq!(after.origin(0), Some(Origin { source: Source(4), since: 21 }));
