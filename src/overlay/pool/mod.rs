@@ -45,8 +45,8 @@ pub use loss::MapLoss;
 pub use plan::MapNeed;
 pub(crate) use resize::{can_put_size, put_first_size, put_size};
 
-/// How much memory of the GPU the maps of all surfaces may take, and how fine they are. May be changed at any time: what
-/// does not fit any more is evicted.
+/// How much memory of the GPU the maps of all surfaces may take, and how fine they are. May be changed at any time: where
+/// it becomes too little, maps are halved, and taken away where that is not enough.
 #[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Resource)]
 pub struct MapBudget {
