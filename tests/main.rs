@@ -69,6 +69,8 @@ mod gpu {
     mod places;
     /// Borders of uv islands, as they are drawn.
     mod seams;
+    /// Maps of another size.
+    mod resize;
     /// Painting.
     mod splat;
     /// Floods, ripples, light through cloth.

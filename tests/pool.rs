@@ -4,11 +4,11 @@ use bevy::asset::uuid::Uuid;
 use bevy::prelude::*;
 use bevy_weathering::overlay::{
     CpuMaps, MapBudget, MapLoss, MapNeed, MapPool, MapSize, OverlayUv, SplatQueue, StampSpace,
-    SurfaceEvicted, SurfaceTotals, Unmapped,
+    SurfaceEvicted, SurfaceResized, SurfaceTotals, Unmapped,
 };
 use bevy_weathering::prelude::*;
 use bevy_weathering::scenes::meshes::ground;
-use bevy_weathering::wetting::{DropQueue, SurfaceWater};
+use bevy_weathering::wetting::{DropQueue, SurfaceWater, TexelWater};
 
 use crate::wetting::scene::Scene;
 
@@ -237,4 +237,134 @@ fn a_surface_that_is_given_other_maps_keeps_its_accounts() {
     assert_balanced(&scene, plate);
     // By its own settings, not by the budget.
     assert_eq!(pool(&scene).evictions, 0);
+}
+
+/// What lies on a surface and what has left it, in units of its own.
+fn held(scene: &Scene, surface: Entity) -> [u64; 2] {
+    let (water, ledger) = (scene.water(surface), scene.water(surface).ledger());
+    let here: u64 = water.texels().iter().map(TexelWater::total).sum();
+    [here + ledger.evaporated, ledger.dripped + ledger.spilled]
+}
+
+/// A row of plates of half a metre, a metre apart, that all have texels; and whose maps got another size meanwhile.
+fn row(scene: &mut Scene, mesh: &Mesh3d, count: u32, z: f32) -> (Vec<Entity>, Vec<SurfaceResized>) {
+    let mut plates = Vec::new();
+    for number in 0..count {
+        plates.push(spawn(scene, mesh.clone(), 128, Vec3::new(number as f32, 0.0, z)));
+    }
+    let budget = scene.0.world().resource::<MapBudget>().bytes;
+    let mut told = Vec::new();
+    update_until(scene, "the texels of a row", |scene| {
+        assert!(pool(scene).reserved <= budget, "{:?}", pool(scene));
+        told.extend(resizes(scene));
+        plates.iter().all(|&plate| has::<SurfaceWater>(scene, plate))
+    });
+    (plates, told)
+}
+
+fn sides(scene: &Scene, plates: &[Entity]) -> Vec<u32> {
+    plates.iter().map(|&plate| get::<MapSize>(scene, plate).texels()).collect()
+}
+
+fn resizes(scene: &mut Scene) -> Vec<SurfaceResized> {
+    scene.0.world_mut().resource_mut::<Messages<SurfaceResized>>().drain().collect()
+}
+
+type State = (Vec<(u32, Vec<TexelWater>)>, MapPool);
+
+/// Twelve plates that fill their budget, of which the last four were hit last, then twenty more, then none of these any more.
+fn crowd() -> State {
+    let mut scene = Scene::new(HZ);
+    let bytes = 12 * NEED.bytes(128) + NEED.bytes(16);
+    scene.0.insert_resource(MapBudget { bytes, texel: None });
+    // So that no rays are cast, as above.
+    let never = Handle::Uuid(Uuid::from_u128(500), std::marker::PhantomData);
+    spawn(&mut scene, Mesh3d(never), 16, Vec3::Y * 50.0);
+    let mesh = add(&mut scene, 0.5);
+    let (plates, _) = row(&mut scene, &mesh, 12, 0.0);
+    assert_eq!(sides(&scene, &plates), [128; 12]);
+    drizzle(&mut scene, 20_000.0, Vec2::new(6.0, 0.3), Vec3::X * 5.5);
+    drizzle(&mut scene, 8000.0, Vec2::new(1.9, 0.3), Vec3::X * 9.5);
+    let before: Vec<[u64; 2]> = plates.iter().map(|&plate| held(&scene, plate)).collect();
+    assert!(before.iter().all(|held| held[0] > 0));
+
+    // A quarter of a map each: what seven plates give by becoming as small.
+    let (more, told) = row(&mut scene, &mesh, 20, 5.0);
+    assert_eq!(sides(&scene, &more), [64; 20]);
+    let now = sides(&scene, &plates);
+    assert_eq!(now[8..], [128; 4], "those that were hit keep their maps");
+    assert_eq!(now.iter().filter(|&&side| side == 64).count(), 7, "{now:?}");
+    let counts = pool(&scene);
+    assert_eq!((counts.shrinks, counts.evictions, counts.refusals, counts.unmapped), (7, 0, 0, 0));
+    // They have half of what they wish for, and so do those that came.
+    assert_eq!((counts.growths, counts.reduced), (0, 27));
+    assert_eq!(told.len(), 7);
+    assert!(
+        told.iter().all(|resize| (resize.from, resize.to) == (128, 64) && plates.contains(&resize.surface))
+    );
+    for (&plate, side) in plates.iter().zip(&now) {
+        assert_eq!([scene.water(plate).size(), get::<CpuMaps>(&scene, plate).size], [*side; 2]);
+        assert_balanced(&scene, plate);
+    }
+    let after: Vec<[u64; 2]> = plates.iter().map(|&plate| held(&scene, plate)).collect();
+    assert_eq!(after, before, "not a unit is lost");
+
+    // Room again: those that were hit not long ago grow back.
+    for plate in more {
+        scene.0.world_mut().entity_mut(plate).despawn();
+    }
+    scene.run(HZ);
+    let before: Vec<u64> = plates.iter().map(|&plate| held(&scene, plate).iter().sum()).collect();
+    update_until(&mut scene, "maps as they were", |scene| sides(scene, &plates) == [128; 12]);
+    scene.0.update();
+    let counts = pool(&scene);
+    assert_eq!((counts.shrinks, counts.growths, counts.reduced, counts.evictions), (7, 7, 0, 0));
+    let after: Vec<u64> = plates.iter().map(|&plate| held(&scene, plate).iter().sum()).collect();
+    assert_eq!(after, before, "not a unit is lost");
+    // Rain goes on on what they have now.
+    drizzle(&mut scene, 20_000.0, Vec2::new(6.0, 0.3), Vec3::X * 5.5);
+    for (&plate, before) in plates.iter().zip(before) {
+        assert!(held(&scene, plate).iter().sum::<u64>() > before);
+        assert_balanced(&scene, plate);
+    }
+    let texels = |plate: &Entity| (scene.water(*plate).size(), scene.water(*plate).texels().to_vec());
+    (plates.iter().map(texels).collect(), counts)
+}
+
+#[test]
+fn those_that_are_hit_keep_their_maps_and_idle_ones_are_halved_before_any_is_evicted() {
+    let once = crowd();
+    assert!(once == crowd(), "the same each time");
+}
+
+#[test]
+fn only_where_halving_is_not_enough_maps_are_lost() {
+    let mut scene = Scene::new(HZ);
+    scene.0.insert_resource(MapBudget { bytes: 4 * NEED.bytes(256), texel: None });
+    let mesh = add(&mut scene, 0.5);
+    let plates: Vec<Entity> =
+        [0.0, 1.0, 2.0, 3.0].map(|x| spawn(&mut scene, mesh.clone(), 256, Vec3::X * x)).to_vec();
+    update_until(&mut scene, "the texels", |scene| {
+        plates.iter().all(|&plate| has::<SurfaceWater>(scene, plate))
+    });
+    for x in [1.0, 0.0, 2.0, 3.0] {
+        drizzle(&mut scene, 600.0, Vec2::splat(0.2), Vec3::X * x);
+    }
+    let before: Vec<[u64; 2]> = plates.iter().map(|&plate| held(&scene, plate)).collect();
+    // All of it comes from the one that was hit longest ago, in one step.
+    scene.0.world_mut().resource_mut::<MapBudget>().bytes = 3 * NEED.bytes(256) + NEED.bytes(64);
+    update_until(&mut scene, "one small plate", |scene| sides(scene, &plates) == [256, 64, 256, 256]);
+    // From all of them.
+    scene.0.world_mut().resource_mut::<MapBudget>().bytes = 4 * NEED.bytes(64);
+    update_until(&mut scene, "small plates", |scene| sides(scene, &plates) == [64; 4]);
+    let after: Vec<[u64; 2]> = plates.iter().map(|&plate| held(&scene, plate)).collect();
+    assert_eq!((after, pool(&scene).evictions, pool(&scene).shrinks), (before, 0, 4));
+    // Nothing is left to be halved.
+    scene.0.world_mut().resource_mut::<MapBudget>().bytes = 3 * NEED.bytes(64);
+    update_until(&mut scene, "an eviction", |scene| !has::<MapSize>(scene, plates[1]));
+    assert_eq!((pool(&scene).evictions, pool(&scene).shrinks), (1, 4));
+    assert!(get::<MapLoss>(&scene, plates[1]).is_lost());
+    for &plate in &plates {
+        assert_balanced(&scene, plate);
+    }
 }

@@ -18,6 +18,7 @@
 mod advance;
 pub mod jet;
 pub mod look;
+mod resize;
 mod settle;
 mod shares;
 pub mod slide;

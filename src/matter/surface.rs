@@ -20,7 +20,7 @@ pub struct SurfaceMatter {
     pub(crate) texels: Vec<TexelMatter>,
     /// Of the loose grains of each texel those that float in its film, units; never more than there are. Empty until the first
     /// are lifted.
-    stirred: Vec<u32>,
+    pub(super) stirred: Vec<u32>,
     pub(crate) tiles: MatterTiles,
     pub(crate) ledger: MatterLedger,
 }

@@ -7,6 +7,7 @@ use super::kernel::{
     axes_part, axis_offset, blend_over, depth_part, dot_axes, facing_part, falloff, framed, lay_stamp,
     slope_color, slope_of, stamp_alpha, stamp_slope, turned, unpack_axis,
 };
+use super::resample::is_reached;
 use super::{MapSize, Splat, SplatQueue, StampAtlas, TILE_SIZE, Weatherable, Wrap};
 use crate::schedule::{WeatheringSystems, WeatheringTick};
 use crate::stamps::StampTexel;
@@ -180,7 +181,7 @@ impl Plugin for CpuOverlayPlugin {
     }
 }
 
-/// Gives new surfaces their maps, and new ones when their size or edges change.
+/// Gives new surfaces their maps, and new ones when their edges change. Where only the size does, what has been painted stays.
 fn add_cpu_maps(
     mut commands: Commands,
     mut changed: Query<
@@ -190,12 +191,17 @@ fn add_cpu_maps(
 ) {
     for (entity, surface, size, maps, mut queue) in &mut changed {
         let (size, wrap) = (size.texels(), surface.wrap());
-        if maps.is_none_or(|maps| (maps.size, maps.wrap) != (size, wrap)) {
-            if maps.is_some() {
+        let new = match maps {
+            Some(maps) if (maps.size, maps.wrap) == (size, wrap) => continue,
+            // Before its texels were measured; else that is done with all that is on it.
+            Some(maps) if maps.wrap == wrap && is_reached(maps.size, size) => maps.resized(size, None),
+            Some(_) => {
                 queue.clear();
+                CpuMaps::of_size(size, wrap)
             }
-            commands.entity(entity).insert(CpuMaps::of_size(size, wrap));
-        }
+            None => CpuMaps::of_size(size, wrap),
+        };
+        commands.entity(entity).insert(new);
     }
 }
 

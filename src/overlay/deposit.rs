@@ -67,6 +67,11 @@ impl SplatQueue {
         self.splats.clear();
     }
 
+    /// Brings the splats to maps of another size. `from`, `to`: texels along each side.
+    pub(super) fn resize(&mut self, from: u32, to: u32) {
+        self.splats.iter_mut().for_each(|splat| *splat = splat.resized(from, to));
+    }
+
     /// Moves the splats behind those in `painter`.
     pub fn drain_into(&mut self, painter: &mut Vec<Splat>) {
         painter.append(&mut self.splats);

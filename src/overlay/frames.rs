@@ -74,6 +74,11 @@ impl SurfaceFrames {
         Self(Arc::new(Frames::new(triangles, &geometry, wrap)), geometry.layout().clone())
     }
 
+    /// Of what was measured by this geometry.
+    pub(crate) fn of(frames: Frames, geometry: &TexelGeometry) -> Self {
+        Self(Arc::new(frames), geometry.layout().clone())
+    }
+
     /// The texels, row by row.
     pub fn texels(&self) -> &[TexelFrame] {
         &self.0.texels

@@ -83,22 +83,26 @@ pub fn mean(sum: u32, count: u32) -> u32 {
 pub fn mip_chain(map: &[[u8; 4]], size: u32, lying: Option<&Lying>) -> Vec<Vec<[u8; 4]>> {
     let mut levels: Vec<Vec<[u8; 4]>> = Vec::new();
     for level in 1..mip_levels(size) {
-        let side = size >> level;
-        let above = levels.last().map_or(map, Vec::as_slice);
-        let halved = |texel: u32| {
-            let (mut sum, mut count) = ([0u32; 4], 0);
-            for texel in four_above(texel, side) {
-                if lying.is_none_or(|lying| lying.lies(level - 1, texel)) {
-                    sum.iter_mut().zip(above[texel]).for_each(|(sum, channel)| *sum += u32::from(channel));
-                    count += 1;
-                }
-            }
-            sum.map(|sum| mean(sum, count) as u8)
-        };
-        let below = (0..side * side).map(halved).collect();
+        let below = halved(levels.last().map_or(map, Vec::as_slice), size, level, lying);
         levels.push(below);
     }
     levels
+}
+
+/// A level of a map with `size` texels along each side, from the level `above` it.
+pub(super) fn halved(above: &[[u8; 4]], size: u32, level: u32, lying: Option<&Lying>) -> Vec<[u8; 4]> {
+    let side = size >> level;
+    let texel_below = |texel: u32| {
+        let (mut sum, mut count) = ([0u32; 4], 0);
+        for texel in four_above(texel, side) {
+            if lying.is_none_or(|lying| lying.lies(level - 1, texel)) {
+                sum.iter_mut().zip(above[texel]).for_each(|(sum, channel)| *sum += u32::from(channel));
+                count += 1;
+            }
+        }
+        sum.map(|sum| mean(sum, count) as u8)
+    };
+    (0..side * side).map(texel_below).collect()
 }
 
 #[cfg(test)]

@@ -26,6 +26,7 @@ pub mod kernel;
 mod maps;
 mod mips;
 mod pool;
+mod resample;
 mod site;
 mod splat;
 mod stamping;
@@ -46,7 +47,10 @@ pub use gpu::{GpuOverlayPlugin, MipStep, Overlays, SplatStats, SurfaceBatch};
 pub(crate) use maps::Footprint;
 pub use maps::{RainRing, TexelArea, TexelAreas};
 pub use mips::{Lying, mip_chain, mip_levels};
-pub use pool::{MapBudget, MapLoss, MapNeed, MapPool, MapSize, SizeMaps, SurfaceEvicted, Unmapped};
+pub use pool::{
+    MapBudget, MapLoss, MapNeed, MapPool, MapSize, SizeMaps, SurfaceEvicted, SurfaceResized, Unmapped,
+};
+pub(crate) use pool::{can_put_size, put_first_size, put_size};
 pub use splat::Splat;
 pub use tiles::{TILE_SIZE, TileBins, TileHeader};
 

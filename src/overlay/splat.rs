@@ -69,6 +69,12 @@ impl Splat {
         [axis(uv.x, wrap[0]), axis(uv.y, wrap[1])]
     }
 
+    /// Itself on a map of another size, where it is as large and at the same place. `from`, `to`: texels along each side.
+    pub(crate) fn resized(self, from: u32, to: u32) -> Self {
+        let (center, radius) = resized_stamp(self.center, self.radius, from, to);
+        Self { center, radius, ..self }
+    }
+
     /// A radius in 1/256 texel, from one in uv; kept so small that a stamp never overlaps itself.
     pub fn radius_from_uv(uv: Vec2, size: u32) -> [i32; 2] {
         let largest = (size as i32 - 1) * SUBTEXELS / 2;
@@ -119,9 +125,34 @@ impl Wrap {
     }
 }
 
+/// Middle and radius of a stamp, 1/256 texel, on a map of another size. `from`, `to`: texels along each side.
+pub(crate) fn resized_stamp(center: [i32; 2], radius: [i32; 2], from: u32, to: u32) -> ([i32; 2], [i32; 2]) {
+    let end = to as i32 * SUBTEXELS;
+    let largest = (to as i32 - 1) * SUBTEXELS / 2;
+    (
+        center.map(|along| resized_length(along, from, to).clamp(0, end - 1)),
+        radius.map(|along| resized_length(along, from, to).clamp(Splat::MIN_RADIUS, largest)),
+    )
+}
+
+/// A length in texels, or parts of one, on a map of another size.
+pub(crate) fn resized_length(length: i32, from: u32, to: u32) -> i32 {
+    let length = i64::from(length) * i64::from(to) / i64::from(from.max(1));
+    length.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_stamp_keeps_its_place_and_size_on_another_map_and_its_least_radius() {
+        let (center, radius) = resized_stamp([300, 64 * 256 - 1], [512, 200], 64, 32);
+        assert_eq!((center, radius), ([150, 32 * 256 - 1], [256, Splat::MIN_RADIUS]));
+        assert_eq!(resized_stamp(center, radius, 32, 64), ([300, 64 * 256 - 2], [512, 256]));
+        // No stamp overlaps itself.
+        assert_eq!(resized_stamp([0; 2], [63 * 128; 2], 64, 32).1, [31 * 128; 2]);
+    }
 
     #[test]
     fn every_texel_holds_what_the_shader_reads_from_it() {

@@ -160,10 +160,12 @@ impl Run<'_> {
         Ok(surfaces.into_iter().map(|(_, _, maps)| maps).collect())
     }
 
-    /// Splats that are not painted yet, wherever they are. None are without a renderer: they are painted in their tick.
+    /// Splats that are not painted yet, wherever they are, and surfaces whose paint is on its way to other maps. None are without a
+    /// renderer: they are painted in their tick.
     pub(super) fn waiting(&mut self) -> u64 {
         let world = self.app.world_mut();
-        let Some(pending) = world.get_resource::<SplatStats>().map(SplatStats::pending) else { return 0 };
+        let pending = world.get_resource::<SplatStats>().map(|stats| stats.pending() + stats.moving());
+        let Some(pending) = pending else { return 0 };
         let mut queues = world.query::<&SplatQueue>();
         pending + queues.iter(world).map(|queue| queue.splats().len() as u64).sum::<u64>()
     }

@@ -13,8 +13,8 @@ use crate::effect::EffectTable;
 use crate::emitter::{EmissionSeed, EmitterState, NewParticles};
 use crate::matter::SurfaceMatter;
 use crate::overlay::{
-    CpuMaps, Lying, MapLoss, MapSize, Overlays, SurfaceFrames, SurfaceTotals, SurfaceTraces, Weatherable,
-    mip_chain,
+    CpuMaps, Lying, MapLoss, MapPool, MapSize, Overlays, SurfaceFrames, SurfaceTotals, SurfaceTraces,
+    Weatherable, can_put_size, mip_chain, put_size,
 };
 use crate::particle::{Particle, ParticleCounts, Particles, SavedParticle};
 use crate::scenario::{Digest, LoadedScenario, check_weather, rewind};
@@ -54,7 +54,8 @@ impl SavedScene {
         }
         for ((entity, name), surface) in surfaces.iter().zip(&state.surfaces) {
             let size = world.get::<SurfaceWater>(*entity).map_or(0, SurfaceWater::size);
-            if size != surface.size {
+            // Where the budget is short, sizes follow what is hit.
+            if size != surface.size && !can_put_size(world, *entity, surface.size) {
                 return Err(value(&path, &format!("size of {name}"), surface.size, size.to_string()));
             }
         }
@@ -110,6 +111,12 @@ impl SavedScene {
             }
         }
 
+        for ((entity, _), surface) in surfaces.iter().zip(&state.surfaces) {
+            put_size(world, *entity, surface.size);
+        }
+        if let Some(mut pool) = world.get_resource_mut::<MapPool>() {
+            pool.resume_at(state.tick, state.hz);
+        }
         rewind(world, state.tick);
         world.insert_resource(drying);
         world.insert_resource(state.weather);

@@ -7,7 +7,10 @@ use super::timeline::rewind;
 use crate::clock::WeatheringClock;
 use crate::emitter::{Emitter, EmitterState, NewParticles};
 use crate::matter::{FallingSnow, MatterQueue, SurfaceMatter};
-use crate::overlay::{CpuMaps, MapLoss, Overlays, SplatQueue, SurfaceTotals, SurfaceTraces, Weatherable};
+use crate::overlay::{
+    CpuMaps, MapLoss, MapSize, Overlays, SplatQueue, SurfaceTotals, SurfaceTraces, Weatherable,
+    put_first_size,
+};
 use crate::particle::{ParticleCounts, Particles, Splashes, WaterCounts};
 use crate::weather::DryingClock;
 use crate::wetting::{DropQueue, ExposureProgress, SurfaceWater, forget_poses};
@@ -59,6 +62,11 @@ pub fn reset_scenario(world: &mut World) {
     for surface in mapped.iter(world).collect::<Vec<_>>() {
         world.entity_mut(surface).remove::<Overlays>();
     }
+    // Where the budget is short, sizes have followed what was hit.
+    let mut sized = world.query_filtered::<Entity, With<MapSize>>();
+    for surface in sized.iter(world).collect::<Vec<_>>() {
+        put_first_size(world, surface);
+    }
     world.resource_mut::<NewParticles>().restart();
     world.resource_mut::<WeatheringClock>().reset();
     world.insert_resource(ParticleCounts::default());
@@ -82,7 +90,9 @@ mod tests {
 
     use super::super::test_app::{app, run_ticks, wait};
     use super::*;
+    use crate::overlay::put_size;
     use crate::scenario::{Scenario, scene_digest};
+    use crate::wetting::MeasureTiming;
 
     const TAP: &str = r#"(
         seconds: 3.0,
@@ -143,6 +153,32 @@ mod tests {
         // A frame without a tick, in which everybody sees that it is clean again.
         app.update();
         assert_eq!(traces(&mut app), SurfaceTraces::default());
+        assert_eq!(run(&mut app), first);
+    }
+
+    #[test]
+    fn surfaces_get_the_maps_back_that_they_began_with() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut app = tap(folder.path());
+        // Its exposure is there before the first tick, however long that takes.
+        app.insert_resource(MeasureTiming::AfterTicks(5));
+        let first = run(&mut app);
+        let size = |app: &mut App| {
+            let world = app.world_mut();
+            let mut surfaces = world.query::<(Entity, &MapSize, &SurfaceWater)>();
+            let (surface, map, water) = surfaces.single(world).unwrap();
+            (surface, map.texels(), water.size())
+        };
+        reset_scenario(app.world_mut());
+        let (surface, ..) = size(&mut app);
+        // As a saved scene in which it has given way.
+        put_size(app.world_mut(), surface, 16);
+        assert_eq!(size(&mut app), (surface, 16, 16));
+        app.update();
+        assert_ne!(run(&mut app).0, first.0);
+        reset_scenario(app.world_mut());
+        assert_eq!(size(&mut app), (surface, 32, 32));
+        app.update();
         assert_eq!(run(&mut app), first);
     }
 }

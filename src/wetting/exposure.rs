@@ -59,6 +59,27 @@ impl Exposure {
         [self.air[texel as usize], self.sun[texel as usize]]
     }
 
+    /// The same on a map of another size: `from` texels along each side before, `to` by now, a half, a quarter and so on of them or
+    /// twice as many. Means of what lay in the place of a texel; it varies too slowly to be looked for anew.
+    pub(crate) fn resized(&self, from: u32, to: u32) -> Self {
+        let map = |bytes: &[u8]| {
+            let ratio = (from / to).max(1);
+            let mean = |texel: u32| {
+                let (x, y) = (texel % to, texel / to);
+                if to > from {
+                    return bytes.get((y * from / to * from + x * from / to) as usize).copied().unwrap_or(0);
+                }
+                let rows = (y * ratio..(y + 1) * ratio).map(|row| row * from + x * ratio);
+                let texels = rows.flat_map(|first| first..first + ratio);
+                let sum: u32 =
+                    texels.filter_map(|texel| bytes.get(texel as usize)).copied().map(u32::from).sum();
+                u8::try_from((sum + ratio * ratio / 2) / (ratio * ratio)).unwrap_or(u8::MAX)
+            };
+            (0..to * to).map(mean).collect()
+        };
+        Self { air: map(&self.air), sun: map(&self.sun), towards_sun: self.towards_sun }
+    }
+
     /// What is used while there is none.
     pub const FREE: [u8; 2] = [128, 0];
 
@@ -281,6 +302,21 @@ pub(super) fn bake_exposure(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn on_another_map_a_texel_gets_the_mean_of_what_lay_there() {
+        let air: Vec<u8> = (0..32 * 32).map(|texel| (texel % 32 * 4 + texel / 32) as u8).collect();
+        let sun = air.iter().map(|air| 255 - air).collect();
+        let exposure = Exposure { air, sun, towards_sun: Some(Vec3::Y) };
+        let half = exposure.resized(32, 16);
+        // 0, 4, 1 and 5: halves are rounded up.
+        assert_eq!((half.bytes_at(0), half.air.len(), half.towards_sun), ([3, 253], 256, Some(Vec3::Y)));
+        assert_eq!(half.bytes_at(17)[0], 13);
+        let twice = half.resized(16, 32);
+        assert_eq!([0, 1, 32, 33].map(|texel| twice.bytes_at(texel)), [[3, 253]; 4]);
+        assert_eq!(twice.bytes_at(2 * 32 + 3)[0], 13);
+        assert_eq!(exposure.resized(32, 32), exposure);
+    }
 
     #[test]
     fn cells_lie_where_their_texels_do_whatever_the_size_of_the_map() {

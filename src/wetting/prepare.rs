@@ -35,7 +35,7 @@ impl MeasureProgress {
 
 /// What a geometry was, or is being, measured from.
 #[derive(Component)]
-pub(super) struct Measured {
+pub(crate) struct Measured {
     size: u32,
     wrap: [Wrap; 2],
     bvh: Arc<MeshBvh>,
@@ -49,6 +49,12 @@ pub(super) struct Measured {
 }
 
 impl Measured {
+    /// Of what was measured elsewhere, and is in use by now: for a map of `size` texels along each side, of a mesh that stood with
+    /// this turn and scale.
+    pub(crate) fn elsewhere(size: u32, wrap: [Wrap; 2], bvh: Arc<MeshBvh>, matrix: Mat3A) -> Self {
+        Self { size, wrap, bvh, matrix, reshaped: false, task: None, asked_at: 0 }
+    }
+
     fn is_of(
         &self,
         map: (u32, [Wrap; 2]),

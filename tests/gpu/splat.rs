@@ -54,7 +54,7 @@ pub(super) fn push(app: &mut App, entity: Entity, splats: &[Splat]) {
 }
 
 /// The maps of a surface, read back.
-fn maps_of(app: &mut App, entity: Entity, surface: &Weatherable) -> CpuMaps {
+pub(super) fn maps_of(app: &mut App, entity: Entity, surface: &Weatherable) -> CpuMaps {
     let overlays = app.world().get::<Overlays>(entity).unwrap().clone();
     let read = read_back(
         app,

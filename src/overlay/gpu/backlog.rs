@@ -37,6 +37,11 @@ impl Backlog {
         queue.drain_into(&mut self.splats);
     }
 
+    /// Brings those that wait to maps of another size. `from`, `to`: texels along each side.
+    pub(super) fn resize(&mut self, from: u32, to: u32) {
+        self.splats[self.painted..].iter_mut().for_each(|splat| *splat = splat.resized(from, to));
+    }
+
     /// Forgets all.
     pub(super) fn clear(&mut self) {
         self.splats.clear();

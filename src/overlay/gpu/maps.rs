@@ -6,7 +6,9 @@ use bevy::prelude::*;
 use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat, TextureUsages};
 use bevy::render::storage::ShaderBuffer;
 
+use super::copies::MapCopies;
 use crate::matter::GpuTexelMatter;
+use crate::overlay::resample::is_reached;
 use crate::overlay::{MapSize, RainRing, SplatQueue, TILE_SIZE, Weatherable, Wrap, mip_levels};
 use crate::wetting::gpu::GpuTexelWater;
 
@@ -130,22 +132,40 @@ fn overlay_image(size: u32, wrap: [Wrap; 2], name: &'static str) -> Image {
     image
 }
 
-/// Gives new surfaces their maps, and new ones when their size or edges change. Whatever else is edited leaves what has been
-/// painted.
+/// Gives new surfaces their maps, and new ones when their size or edges change. Where only the size does, to twice the side or a half,
+/// a quarter and so on, what has been painted moves over; whatever else is edited leaves it.
 pub(super) fn add_overlays(
     mut commands: Commands,
     mut images: ResMut<Assets<Image>>,
     mut buffers: ResMut<Assets<ShaderBuffer>>,
-    changed: Query<
-        (Entity, &Weatherable, &MapSize, Option<&Overlays>),
+    mut changed: Query<
+        (Entity, &Weatherable, &MapSize, Option<&Overlays>, Option<&mut MapCopies>),
         Or<(Changed<Weatherable>, Changed<MapSize>)>,
     >,
 ) {
-    for (entity, surface, size, maps) in &changed {
+    for (entity, surface, size, maps, copies) in &mut changed {
         let (size, wrap) = (size.texels(), surface.wrap());
-        if maps.is_none_or(|maps| (maps.size, maps.wrap) != (size, wrap)) {
-            commands.entity(entity).insert(Overlays::new(size, wrap, &mut images, &mut buffers));
+        if maps.is_some_and(|maps| (maps.size, maps.wrap) == (size, wrap)) {
+            continue;
         }
+        let mut new = Overlays::new(size, wrap, &mut images, &mut buffers);
+        if let Some(old) = maps
+            && old.has_colors
+            && old.wrap == wrap
+            && is_reached(old.size, size)
+            && size <= 2 * old.size
+        {
+            new.open_colors(&mut images, &mut buffers);
+            match copies {
+                Some(mut copies) => copies.push(old, &new),
+                None => {
+                    let mut copies = MapCopies::default();
+                    copies.push(old, &new);
+                    commands.entity(entity).insert(copies);
+                }
+            }
+        }
+        commands.entity(entity).insert(new);
     }
 }
 
@@ -164,7 +184,7 @@ pub(super) fn open_overlays(
 
 /// Drops the maps of a surface that has lost its size.
 pub(super) fn release_overlays(removed: On<Remove, MapSize>, mut commands: Commands) {
-    commands.entity(removed.entity).try_remove::<Overlays>();
+    commands.entity(removed.entity).try_remove::<(Overlays, MapCopies)>();
 }
 
 #[cfg(test)]

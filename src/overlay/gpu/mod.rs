@@ -5,9 +5,10 @@
 //! uploads them; until the pipeline and the maps exist, they wait, and so does what is beyond the frame's [`SplatBudget`]. If the
 //! pipeline can never exist, they are counted as [lost](SplatStats::lost) and time goes on. The pass dispatches one workgroup per
 //! touched tile: a surface without new splats costs nothing, which [`SplatStats`] shows. Then the touched tiles are halved into
-//! the mip maps of the colour maps (`mips.rs`).
+//! the mip maps of the colour maps (`mips.rs`). Maps of another size get what was painted on the old ones (`copies.rs`).
 
 mod backlog;
+mod copies;
 mod hold;
 mod maps;
 mod mips;
@@ -47,6 +48,7 @@ impl Plugin for GpuOverlayPlugin {
         load_shader_library!(app, "../../../shaders/common/stamp.wgsl");
         embedded_asset!(app, "../../../shaders/splat.wgsl");
         embedded_asset!(app, "../../../shaders/mips.wgsl");
+        embedded_asset!(app, "../../../shaders/resize.wgsl");
 
         let stats = SplatStats::default();
         app.insert_resource(stats.clone())
@@ -58,7 +60,7 @@ impl Plugin for GpuOverlayPlugin {
                 PreUpdate,
                 (
                     // Of maps whose size has been decided; what has waited since the last tick gets its room at once.
-                    (maps::add_overlays, maps::open_overlays).chain().after(SizeMaps),
+                    (copies::forget_copies, maps::add_overlays, maps::open_overlays).chain().after(SizeMaps),
                     // What is taken away with its maps waits no more.
                     hold::hold_ticks.after(SizeMaps),
                 ),
@@ -76,10 +78,25 @@ impl Plugin for GpuOverlayPlugin {
             .init_resource::<prepare::SplatBatches>()
             .init_resource::<prepare::StampTexture>()
             .init_resource::<mips::MipBatches>()
+            .init_resource::<copies::PendingCopies>()
             .init_resource::<SpecializedComputePipelines<pass::SplatPipeline>>()
-            .add_systems(RenderStartup, (pass::init_splat_pipeline, mips::init_mip_pipeline))
-            .add_systems(ExtractSchedule, (prepare::extract_splats, prepare::extract_stamps).chain())
-            .add_systems(Render, prepare::prepare_splats.in_set(RenderSystems::PrepareBindGroups))
+            .add_systems(
+                RenderStartup,
+                (pass::init_splat_pipeline, mips::init_mip_pipeline, copies::init_double_pipeline),
+            )
+            .add_systems(
+                ExtractSchedule,
+                (prepare::extract_splats, prepare::extract_stamps, copies::extract_copies).chain(),
+            )
+            .add_systems(
+                Render,
+                // Splats wait for what was painted before them.
+                (copies::prepare_copies, prepare::prepare_splats)
+                    .chain()
+                    .in_set(RenderSystems::PrepareBindGroups),
+            )
+            // Splats are painted over what was there before.
+            .add_systems(RenderGraph, copies::move_maps.before(pass::paint_splats))
             // Materials sample the maps that this pass writes.
             .add_systems(RenderGraph, pass::paint_splats.before(camera_driver));
     }

@@ -16,6 +16,7 @@ use bevy::render::{Extract, MainWorld};
 
 use super::SplatStats;
 use super::backlog::Backlog;
+use super::copies::{MapCopies, PendingCopies};
 use super::maps::Overlays;
 use super::mips::{MipBatches, MipPipeline, SurfaceLevels};
 use super::pass::{SplatKinds, SplatPipeline, has_failed};
@@ -98,14 +99,20 @@ pub(super) fn extract_splats(
     stats: Res<SplatStats>,
     mut query: Local<
         Option<
-            QueryState<(Entity, &'static Overlays, &'static mut SplatQueue, Option<&'static SurfaceFrames>)>,
+            QueryState<(
+                Entity,
+                &'static Overlays,
+                &'static mut SplatQueue,
+                Option<&'static SurfaceFrames>,
+                Option<&'static MapCopies>,
+            )>,
         >,
     >,
 ) {
     let query = query.get_or_insert_with(|| main_world.query());
     pending.budget = main_world.get_resource::<SplatBudget>().copied().unwrap_or_default();
     let PendingSplats { surfaces, by_entity, .. } = &mut *pending;
-    for (entity, overlays, mut queue, frames) in query.iter_mut(&mut main_world) {
+    for (entity, overlays, mut queue, frames, copies) in query.iter_mut(&mut main_world) {
         if let Some(&index) = by_entity.get(&entity) {
             let waiting = &mut surfaces[index];
             let maps = Maps::from(overlays);
@@ -113,7 +120,12 @@ pub(super) fn extract_splats(
                 // Levels hold on to their textures, also those that a surface has no more.
                 waiting.levels = None;
             }
-            if waiting.maps.rings != maps.rings {
+            let moves_over = copies.is_some_and(|copies| copies.lead(waiting.maps.images, maps.images));
+            if waiting.maps.size != maps.size && moves_over {
+                // What waits is painted over what was there before, by places on the new maps.
+                waiting.backlog.resize(waiting.maps.size, maps.size);
+                (waiting.frames, waiting.frame_buffer, waiting.lying) = (frames.cloned(), None, None);
+            } else if waiting.maps.rings != maps.rings {
                 // New maps: what was meant for the old ones is gone with them.
                 stats.drop_splats(waiting.backlog.len());
                 waiting.backlog.clear();
@@ -237,7 +249,7 @@ pub(super) fn prepare_splats(
     mut mips: ResMut<MipBatches>,
     mut stamps: ResMut<StampTexture>,
     mut pipelines: ResMut<SpecializedComputePipelines<SplatPipeline>>,
-    stats: Res<SplatStats>,
+    (stats, copies): (Res<SplatStats>, Res<PendingCopies>),
     pipeline: Res<SplatPipeline>,
     mip_pipeline: Res<MipPipeline>,
     cache: Res<PipelineCache>,
@@ -281,6 +293,9 @@ pub(super) fn prepare_splats(
             continue;
         }
         let Maps { size, wrap, images: [diffuse, specular, normal], rings } = waiting.maps;
+        if copies.hold(diffuse) {
+            continue;
+        }
         let (Some(diffuse), Some(specular), Some(normal), Some(rings)) =
             (images.get(diffuse), images.get(specular), images.get(normal), buffers.get(rings))
         else {
@@ -429,6 +444,33 @@ mod tests {
         schedule.run(&mut render);
         let stats = render.resource::<SplatStats>();
         assert_eq!((pending(&render), stats.pending(), stats.dropped()), (vec![], 0, 4));
+    }
+
+    #[test]
+    fn maps_of_another_size_get_what_was_meant_for_the_old() {
+        let (mut render, surface) = worlds();
+        let mut schedule = Schedule::default();
+        schedule.add_systems(extract_splats);
+        {
+            let mut main = render.resource_mut::<MainWorld>();
+            let mut queue = main.get_mut::<SplatQueue>(surface).unwrap();
+            queue.push(Splat { tick: 1, center: [600, 1000], radius: [512, 512], ..Splat::zeroed() });
+        }
+        schedule.run(&mut render);
+        let image =
+            |number| Handle::Uuid(bevy::asset::uuid::Uuid::from_u128(number), std::marker::PhantomData);
+        {
+            let mut main = render.resource_mut::<MainWorld>();
+            let old = main.get::<Overlays>(surface).unwrap().clone();
+            let new = Overlays { size: 256, diffuse: image(7), rings: default(), ..old.clone() };
+            let mut copies = MapCopies::default();
+            copies.push(&old, &new);
+            main.entity_mut(surface).insert((new, copies));
+        }
+        schedule.run(&mut render);
+        let waiting = render.resource::<PendingSplats>().surfaces[0].backlog.waiting();
+        assert_eq!((waiting.len(), waiting[0].center, waiting[0].radius), (1, [300, 500], [256, 256]));
+        assert_eq!(render.resource::<SplatStats>().dropped(), 0);
     }
 
     #[test]

@@ -19,6 +19,7 @@ struct Counters {
     dropped: AtomicU64,
     lost: AtomicU64,
     pending: AtomicU64,
+    moving: AtomicU64,
 }
 
 impl SplatStats {
@@ -63,6 +64,15 @@ impl SplatStats {
     /// Splats that wait in the render world now, for whatever reason.
     pub fn pending(&self) -> u64 {
         self.0.pending.load(Ordering::Relaxed)
+    }
+
+    /// Surfaces whose paint has not moved over to their maps of another size yet.
+    pub fn moving(&self) -> u64 {
+        self.0.moving.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn set_moving(&self, surfaces: usize) {
+        self.0.moving.store(surfaces as u64, Ordering::Relaxed);
     }
 
     pub(super) fn add(&self, splats: usize, tiles: usize) {

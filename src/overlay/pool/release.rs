@@ -3,6 +3,7 @@
 use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 
+use super::resize::resize_queues;
 use super::{MapLoss, MapSize};
 use crate::clock::WeatheringClock;
 use crate::material::PorousMaterial;
@@ -31,6 +32,18 @@ pub(super) struct Release<'w, 's> {
 }
 
 impl Release<'_, '_> {
+    /// The present tick, and how many there are in a second, 1 or more.
+    pub(super) fn now(&self) -> (u32, u32) {
+        self.clock.as_ref().map_or((0, 1), |clock| (clock.tick(), clock.hz().max(1)))
+    }
+
+    /// Brings what waits for a surface to its maps of another size.
+    pub(super) fn resize_queues(&mut self, surface: Entity, from: u32, to: u32) {
+        if let Ok(((_, mut splats, _), (_, mut deposits, mut drops), _)) = self.surfaces.get_mut(surface) {
+            resize_queues(from, to, &mut splats, drops.as_deref_mut(), deposits.as_deref_mut());
+        }
+    }
+
     /// Empties a surface and takes its [`MapSize`], at which all that was made for it is dropped. Returns what there was.
     pub(super) fn release(&mut self, commands: &mut Commands, surface: Entity) -> MapLoss {
         commands.entity(surface).try_remove::<MapSize>();

@@ -1,15 +1,19 @@
-//! Giving surfaces the size of their maps, and taking maps away when there is no room for all.
+//! Giving surfaces the size of their maps, and less of it, or none, when there is no room for all.
 
 use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 
 use super::plan::{MapNeed, Wish, fit};
 use super::release::Release;
-use super::{MapBudget, MapLoss, MapPool, MapSize, SurfaceEvicted, SurfaceOrder, Unmapped};
+use super::resize::{Resizing, tell};
+use super::room::{Change, Mapped, Room, Step};
+use super::{
+    MapBudget, MapLoss, MapPool, MapSize, SurfaceEvicted, SurfaceOrder, SurfaceResized, Unmapped, label,
+};
 use crate::collision::{DeformingCollider, NotWeatherable, SurfaceCollider};
 use crate::effect::{Carries, EffectTable, WeatherEffect};
-use crate::overlay::{StampSpace, SurfaceTotals, TexelArea, Weatherable};
-use crate::wetting::DripEffect;
+use crate::overlay::{StampSpace, SurfaceFrames, SurfaceTotals, TexelArea, Weatherable};
+use crate::wetting::{DripEffect, SurfaceWater, WetGeometry};
 
 /// What may fall by the effects that there are.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -47,17 +51,10 @@ impl Falling {
 
 type Found = (
     (Entity, &'static Weatherable, &'static SurfaceOrder, &'static SurfaceTotals),
-    (Option<&'static MapSize>, Has<Unmapped>),
+    (Option<&'static MapSize>, Has<Unmapped>, Option<&'static Resizing>),
     (Option<&'static SurfaceCollider>, Option<&'static GlobalTransform>, Has<Mesh3d>, Has<DeformingCollider>),
+    (Has<WetGeometry>, Has<SurfaceWater>, Has<SurfaceFrames>, Option<&'static TexelArea>),
 );
-
-/// A surface that has maps.
-struct Mapped {
-    entity: Entity,
-    /// Tick of the last impact, then the order of spawning.
-    age: (u32, u64),
-    bytes: u64,
-}
 
 /// A surface that has none.
 #[derive(Clone, Copy)]
@@ -70,18 +67,12 @@ struct Waiting {
     again: bool,
 }
 
-/// What is left of the budget, and who can be asked for more.
-struct Room {
-    /// Bytes; below 0 if more are taken than there are.
-    free: i128,
-    /// Who was hit longest ago comes first.
-    candidates: vec::IntoIter<Mapped>,
-}
-
-impl Room {
-    fn bytes(&self) -> u64 {
-        u64::try_from(self.free).unwrap_or(0)
-    }
+/// Whether there is room.
+enum Outcome {
+    Now,
+    /// When what is on its way has come.
+    Soon,
+    Never,
 }
 
 /// All that a decision is made from, and written to.
@@ -91,6 +82,7 @@ pub(super) struct Sizing<'w, 's> {
     budget: Res<'w, MapBudget>,
     pool: ResMut<'w, MapPool>,
     evicted: MessageWriter<'w, SurfaceEvicted>,
+    resized: MessageWriter<'w, SurfaceResized>,
     release: Release<'w, 's>,
     surfaces: Query<'w, 's, Found, Without<NotWeatherable>>,
     names: Query<'w, 's, &'static Name>,
@@ -99,7 +91,7 @@ pub(super) struct Sizing<'w, 's> {
 /// Surfaces about which nothing has been decided.
 type New = (With<Weatherable>, Without<MapSize>, Without<Unmapped>, Without<NotWeatherable>);
 
-/// Decides about surfaces that are new, were edited or go without. Does nothing while there are none.
+/// Decides about surfaces that are new, were edited, go without or have less than they wish for. Does nothing while there are none.
 pub(super) fn size_surfaces(
     effects: Res<EffectTable>,
     loaded: Option<Res<Assets<WeatherEffect>>>,
@@ -112,21 +104,29 @@ pub(super) fn size_surfaces(
     let MapPool { unmapped, reserved, next_bytes, .. } = *sizing.pool;
     let room_again = unmapped > 0 && reserved.saturating_add(next_bytes) <= sizing.budget.bytes;
     let unchanged = falling == sizing.pool.falling && !sizing.budget.is_changed();
-    if unchanged && new.is_empty() && edited.is_empty() && !room_again {
+    let (tick, hz) = sizing.release.now();
+    let second = tick / hz;
+    let is_due = second != sizing.pool.second && (unmapped > 0 || sizing.pool.reduced > 0);
+    let is_over = reserved > sizing.budget.bytes;
+    if unchanged && new.is_empty() && edited.is_empty() && !room_again && !is_due && !is_over {
         return;
     }
     sizing.pool.falling = falling;
-    let (mut mapped, mut waiting) = sizing.sort_out();
-    let taken: i128 = mapped.iter().map(|mapped| i128::from(mapped.bytes)).sum();
-    mapped.sort_unstable_by_key(|mapped| mapped.age);
+    let (mapped, mut waiting) = sizing.sort_out();
     waiting.sort_unstable_by_key(|waiting| waiting.wish.order);
-    let mut room = Room { free: i128::from(sizing.budget.bytes) - taken, candidates: mapped.into_iter() };
+    let mut room = Room::new(sizing.budget.bytes, mapped);
     let turned_out = (sizing.pool.evictions, sizing.pool.refusals);
     sizing.make_room(&mut room, 0);
     let (again, new): (Vec<Waiting>, Vec<Waiting>) = waiting.into_iter().partition(|waiting| waiting.again);
     let is_complete = sizing.map_new(&mut room, &new);
     // Who went without is served when everybody else is.
     let next = if is_complete { sizing.map_again(&mut room, &again) } else { None };
+    if is_due {
+        sizing.pool.second = second;
+        if is_complete {
+            sizing.follow_use(&mut room, next, tick.checked_sub(MapBudget::IDLE_SECONDS * hz));
+        }
+    }
     let is_settled = turned_out == (sizing.pool.evictions, sizing.pool.refusals);
     sizing.pool.next_bytes = next.filter(|_| is_settled).unwrap_or(0);
 }
@@ -136,14 +136,33 @@ impl Sizing<'_, '_> {
     fn sort_out(&mut self) -> (Vec<Mapped>, Vec<Waiting>) {
         let falling = self.pool.falling;
         let (mut mapped, mut waiting) = (Vec::new(), Vec::new());
-        for ((entity, surface, order, totals), (size, again), (collider, _, has_mesh, is_posed)) in
-            &self.surfaces
+        for (
+            (entity, surface, order, totals),
+            (size, again, resizing),
+            (collider, transform, has_mesh, is_posed),
+            (has_geometry, has_water, _, area),
+        ) in &self.surfaces
         {
             let need = falling.need(surface, is_posed);
             if let Some(size) = size {
                 if size.is_for(surface) {
-                    let age = (totals.last_tick, order.0);
-                    mapped.push(Mapped { entity, age, bytes: need.bytes(size.texels()) });
+                    let is_there = collider.is_some() && transform.is_some();
+                    mapped.push(Mapped {
+                        entity,
+                        age: (totals.last_tick, order.0),
+                        need,
+                        side: size.texels,
+                        smallest: MapBudget::SMALLEST_SIDE.min(size.limit),
+                        granted: size.granted,
+                        wish: size.wish,
+                        target: resizing.map(|resizing| resizing.to),
+                        texel_mm2: area.map_or(0.0, |area| area.mean_mm2),
+                        change: match (has_geometry, has_water) {
+                            (true, true) if is_there => Change::Later,
+                            (false, false) => Change::AtOnce,
+                            _ => Change::Never,
+                        },
+                    });
                     continue;
                 }
                 let lost = self.release.release(&mut self.commands, entity);
@@ -157,14 +176,16 @@ impl Sizing<'_, '_> {
         (mapped, waiting)
     }
 
-    /// Takes maps away until so many bytes are free. Whether they are.
-    fn make_room(&mut self, room: &mut Room, bytes: u64) -> bool {
-        while room.free < i128::from(bytes)
-            && let Some(Mapped { entity: surface, bytes, .. }) = room.candidates.next()
+    /// Makes room for so many bytes: by halving maps and, where that is not enough, by taking some away.
+    fn make_room(&mut self, room: &mut Room, bytes: u64) -> Outcome {
+        if !room.has(bytes) {
+            self.change(room.give_way(bytes, u32::MAX));
+        }
+        while !room.will_have(bytes)
+            && let Some(surface) = room.next_out()
         {
             let lost = self.release.release(&mut self.commands, surface);
             self.commands.entity(surface).insert(Unmapped::Evicted);
-            room.free += i128::from(bytes);
             self.pool.evictions += 1;
             warn!(
                 "{} has lost its maps, for which the budget of {} bytes has no room any more, and with them its marks, {:.1} \
@@ -177,35 +198,86 @@ impl Sizing<'_, '_> {
             );
             self.evicted.write(SurfaceEvicted { surface, lost });
         }
-        room.free >= i128::from(bytes)
+        match (room.has(bytes), room.will_have(bytes)) {
+            (true, _) => Outcome::Now,
+            (false, true) => Outcome::Soon,
+            (false, false) => Outcome::Never,
+        }
+    }
+
+    /// Begins to give surfaces maps of another size.
+    fn change(&mut self, steps: Vec<Step>) {
+        for Step { entity, change, from, to } in steps {
+            let Ok(((_, surface, ..), (Some(&size), ..), (collider, transform, ..), (_, _, has_frames, _))) =
+                self.surfaces.get(entity)
+            else {
+                continue;
+            };
+            if change == Change::AtOnce {
+                self.release.resize_queues(entity, from, to);
+                let mut size = MapSize { texels: to, ..size };
+                tell(&mut size, from, || label(&self.names, entity));
+                self.commands.entity(entity).insert(size);
+                self.pool.count_resize(from, to);
+                self.resized.write(SurfaceResized { surface: entity, from, to });
+            } else if let (Some(collider), Some(transform)) = (collider, transform) {
+                let (tick, _) = self.release.now();
+                let resizing = Resizing::begin(to, surface.wrap(), collider, transform, has_frames, tick);
+                self.commands.entity(entity).insert(resizing);
+            }
+        }
+    }
+
+    /// Room for who went without, whose maps take `next` bytes; if nobody did, for those that are hit. `idle_until`: who was hit in this
+    /// tick for the last time, or before, gives way; nobody does while there has been none.
+    fn follow_use(&mut self, room: &mut Room, next: Option<u64>, idle_until: Option<u32>) {
+        let steps = match (next, idle_until) {
+            (None, _) => room.grow(idle_until),
+            (Some(bytes), Some(idle_until)) if room.could_have(bytes, idle_until) => {
+                room.give_way(bytes, idle_until)
+            }
+            (Some(_), _) => return,
+        };
+        self.change(steps);
     }
 
     /// Maps for surfaces that are new, in the order in which they were spawned. Whether nobody waits any more.
     fn map_new(&mut self, room: &mut Room, new: &[Waiting]) -> bool {
         let texel = self.budget.texel;
-        let most: i128 = new.iter().map(|new| i128::from(new.wish.need.bytes(new.wish.limit))).sum();
+        let most: u64 = new.iter().map(|new| new.wish.need.bytes(new.wish.limit)).sum();
         // Where all get what they wish for, it does not matter who comes first. Else everybody has to be there.
-        let plenty = most <= room.free;
+        let plenty = room.has(most);
         let by_shape = !plenty || texel.is_some();
         let all_there = new.iter().all(|new| new.has_shape);
         if !plenty && !all_there {
             return false;
         }
         let ready: Vec<Waiting> = new.iter().filter(|new| new.has_shape || !by_shape).copied().collect();
-        let sides = fit(&self.wishes(&ready, by_shape), texel, room.bytes());
-        for (surface, side) in ready.iter().zip(sides) {
-            let bytes = surface.wish.need.bytes(side);
-            if self.make_room(room, bytes) {
-                room.free -= i128::from(bytes);
-                self.grant(surface.entity, side);
-            } else {
-                self.commands.entity(surface.entity).insert(Unmapped::Refused);
-                self.pool.refusals += 1;
-                error!(
-                    "{} stays unweathered: a budget of {} bytes has no room for its maps, {side} x {side} texels",
-                    label(&self.names, surface.entity),
-                    self.budget.bytes
-                );
+        let wishes = self.wishes(&ready, by_shape);
+        let sides = fit(&wishes, texel, room.bytes());
+        let total: u64 = wishes.iter().zip(&sides).map(|(wish, &side)| wish.need.bytes(side)).sum();
+        if !room.has(total) {
+            // For all of them at once, since it takes a while.
+            self.change(room.give_way(total, u32::MAX));
+        }
+        for ((surface, wish), side) in ready.iter().zip(&wishes).zip(sides) {
+            let bytes = wish.need.bytes(side);
+            match self.make_room(room, bytes) {
+                Outcome::Now => {
+                    room.take(bytes);
+                    self.grant(surface.entity, side, wish.side(texel));
+                }
+                // Who comes after it waits, too.
+                Outcome::Soon => return false,
+                Outcome::Never => {
+                    self.commands.entity(surface.entity).insert(Unmapped::Refused);
+                    self.pool.refusals += 1;
+                    error!(
+                        "{} stays unweathered: a budget of {} bytes has no room for its maps, {side} x {side} texels",
+                        label(&self.names, surface.entity),
+                        self.budget.bytes
+                    );
+                }
             }
         }
         ready.len() == new.len()
@@ -216,23 +288,25 @@ impl Sizing<'_, '_> {
         let smallest = |surface: &Waiting| surface.wish.need.bytes(surface.wish.smallest());
         let mut needed = 0;
         let fits = |&&surface: &&Waiting| {
-            needed += i128::from(smallest(&surface));
-            surface.has_shape && needed <= room.free
+            needed += smallest(&surface);
+            surface.has_shape && room.has(needed)
         };
         let served = again.iter().take_while(fits).count();
         let (served, left) = again.split_at(served);
-        let sides = fit(&self.wishes(served, true), self.budget.texel, room.bytes());
-        for (surface, side) in served.iter().zip(sides) {
-            room.free -= i128::from(surface.wish.need.bytes(side));
+        let texel = self.budget.texel;
+        let wishes = self.wishes(served, true);
+        let sides = fit(&wishes, texel, room.bytes());
+        for ((surface, wish), side) in served.iter().zip(&wishes).zip(sides) {
+            room.take(wish.need.bytes(side));
             info!("{} has maps again, {side} x {side} texels", label(&self.names, surface.entity));
-            self.grant(surface.entity, side);
+            self.grant(surface.entity, side, wish.side(texel));
         }
         left.first().map(smallest)
     }
 
-    fn grant(&mut self, surface: Entity, side: u32) {
+    fn grant(&mut self, surface: Entity, side: u32, wish: u32) {
         let Ok(((_, settings, ..), ..)) = self.surfaces.get(surface) else { return };
-        let size = MapSize::reduced(settings, side);
+        let size = MapSize::reduced(settings, side, wish);
         self.commands.entity(surface).remove::<Unmapped>().insert(size);
     }
 
@@ -240,7 +314,9 @@ impl Sizing<'_, '_> {
     fn wishes(&self, surfaces: &[Waiting], by_shape: bool) -> Vec<Wish> {
         let wish = |waiting: &Waiting| {
             let mut wish = waiting.wish;
-            if by_shape && let Ok((.., (Some(collider), transform, ..))) = self.surfaces.get(waiting.entity) {
+            if by_shape
+                && let Ok((_, _, (Some(collider), transform, ..), _)) = self.surfaces.get(waiting.entity)
+            {
                 wish.extent = extent(collider, transform);
             }
             wish
@@ -256,8 +332,4 @@ fn extent(collider: &SurfaceCollider, transform: Option<&GlobalTransform>) -> f6
     let side = Weatherable::MAX_MAP_SIZE;
     let area = TexelArea::new(collider.0.triangles(), &world_from_mesh, side);
     f64::from(area.mean_mm2).sqrt() * 1e-3 * f64::from(side)
-}
-
-fn label(names: &Query<&Name>, entity: Entity) -> String {
-    names.get(entity).map_or_else(|_| entity.to_string(), ToString::to_string)
 }

@@ -2,6 +2,7 @@
 
 use bevy::prelude::*;
 
+use super::resize::Resizing;
 use super::{MapNeed, MapPool, MapSize, Unmapped};
 use crate::collision::{DeformingCollider, NotWeatherable};
 use crate::matter::SurfaceMatter;
@@ -9,7 +10,7 @@ use crate::overlay::{SurfaceFrames, SurfaceTotals, Weatherable};
 use crate::wetting::SurfaceWater;
 
 type Holder = (
-    (&'static MapSize, &'static Weatherable, Has<DeformingCollider>),
+    (&'static MapSize, &'static Weatherable, Has<DeformingCollider>, Option<&'static Resizing>),
     (
         &'static SurfaceTotals,
         Option<&'static SurfaceWater>,
@@ -24,9 +25,9 @@ pub(super) fn tally(
     surfaces: Query<Holder, Without<NotWeatherable>>,
     unmapped: Query<(), (With<Unmapped>, Without<NotWeatherable>)>,
 ) {
-    let mut counts = MapPool { used: 0, reserved: 0, mapped: 0, ..*pool };
+    let mut counts = MapPool { used: 0, reserved: 0, mapped: 0, reduced: 0, ..*pool };
     counts.unmapped = unmapped.iter().len() as u32;
-    for ((size, surface, is_posed), (totals, water, matter, has_frames)) in &surfaces {
+    for ((size, surface, is_posed, resizing), (totals, water, matter, has_frames)) in &surfaces {
         // Painters make room with the first splat.
         let hit = totals.last_tick > 0;
         let held = MapNeed {
@@ -37,7 +38,9 @@ pub(super) fn tally(
         };
         counts.mapped += 1;
         counts.used += held.bytes(size.texels);
-        counts.reserved += counts.falling.need(surface, is_posed).bytes(size.texels);
+        counts.reduced += u32::from(size.is_reduced());
+        let charged = resizing.map_or(0, |resizing| resizing.to).max(size.texels);
+        counts.reserved += counts.falling.need(surface, is_posed).bytes(charged);
     }
     pool.set_if_neq(counts);
 }
