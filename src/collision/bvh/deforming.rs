@@ -6,7 +6,7 @@
 //! area of all its boxes over that of the outermost, tells by how much: what has become twice as bad as when it was built
 //! is built anew. Hits do not depend on the tree.
 //!
-//! Binary, since the wide tree of [`MeshBvh`](super::MeshBvh) stores its boxes compressed and cannot be refitted.
+//! Binary: built anew in the middle of a tick, it is not made wide first, as that of [`MeshBvh`](super::MeshBvh) is.
 
 use std::sync::Arc;
 
