@@ -73,7 +73,8 @@ impl DeformingBvh {
         self.bounds
     }
 
-    /// The closest hit on a part of the segment, from either side, as `MeshBvh::cast_within` finds it.
+    /// The closest hit on a part of the segment, from either side, as `MeshBvh::cast_within` finds it; but of several triangles in
+    /// one place it may be any.
     #[inline]
     pub(in crate::collision) fn cast_within(&self, segment: Segment, fraction: f32) -> Option<LocalHit> {
         // Nothing to hit: the boxes are not up to date.

@@ -11,7 +11,9 @@ pub(super) const PACK: usize = 4;
 /// In place of a triangle.
 const NO_TRIANGLE: u32 = u32::MAX;
 
-/// Up to four triangles. The normals are left out: working them out anew is faster than reading them.
+/// Up to four triangles. The normals are left out: working them out anew is faster than reading them. So aligned, it never lies
+/// in more cache lines than it has to.
+#[repr(align(32))]
 pub(super) struct TrianglePack {
     /// x, y and z of the first corners.
     corner: [Vec4; 3],
