@@ -6,7 +6,7 @@
 //! area of all its boxes over that of the outermost, tells by how much: what has become twice as bad as when it was built
 //! is built anew. Hits do not depend on the tree.
 //!
-//! Binary, since the wide tree of [`MeshBvh`](super::MeshBvh) stores its boxes compressed and cannot be refitted.
+//! Binary: built anew in the middle of a tick, it is not made wide first, as that of [`MeshBvh`](super::MeshBvh) is.
 
 use std::sync::Arc;
 
@@ -73,7 +73,8 @@ impl DeformingBvh {
         self.bounds
     }
 
-    /// The closest hit on a part of the segment, from either side, as `MeshBvh::cast_within` finds it.
+    /// The closest hit on a part of the segment, from either side, as `MeshBvh::cast_within` finds it; but of several triangles in
+    /// one place it may be any.
     #[inline]
     pub(in crate::collision) fn cast_within(&self, segment: Segment, fraction: f32) -> Option<LocalHit> {
         // Nothing to hit: the boxes are not up to date.

@@ -1,16 +1,15 @@
 //! The boxes of a tree, level by level, for those who want to see it.
 
 use bevy::prelude::*;
-use obvhs::aabb::Aabb;
 
-use super::{DeformingBvh, MeshBvh, corners_of};
+use super::{DeformingBvh, MeshBvh, corners_of, wide};
 
-/// What is below a node.
+/// What is below a node, with the corners of its box.
 enum Child {
     /// It has children of its own.
-    Inner(u32, Aabb),
+    Inner(u32, (Vec3, Vec3)),
     /// It holds triangles.
-    Leaf(Aabb),
+    Leaf((Vec3, Vec3)),
 }
 
 impl MeshBvh {
@@ -18,18 +17,12 @@ impl MeshBvh {
     /// triangles. Smallest and largest corner of each, mesh space; at most `most` of them, and those that end first come first.
     /// The tree is eight wide.
     pub fn boxes(&self, level: u32, most: usize) -> Vec<(Vec3, Vec3)> {
-        if self.triangles.positions.is_empty() {
-            return Vec::new();
-        }
-        boxes(self.bvh.total_aabb, level, most, |index, found| {
-            let Some(node) = self.bvh.nodes.get(index as usize) else { return };
-            for child in (0..8).filter(|&child| !node.is_child_empty(child)) {
-                let aabb = node.child_aabb(child);
-                let is_leaf = node.is_leaf(child);
-                found(if is_leaf {
-                    Child::Leaf(aabb)
-                } else {
-                    Child::Inner(node.child_node_index(child), aabb)
+        let Some(root) = self.tree.bounds else { return Vec::new() };
+        boxes(root, level, most, |index, found| {
+            for (child, corners) in self.tree.children(index) {
+                found(match child {
+                    wide::Child::Inner(index) => Child::Inner(index, corners),
+                    wide::Child::Leaf(_) => Child::Leaf(corners),
                 });
             }
         })
@@ -43,12 +36,12 @@ impl DeformingBvh {
         let Some(root) = nodes.first() else { return Vec::new() };
         // It may be all there is.
         let level = if root.is_leaf() { 0 } else { level };
-        boxes(*root.aabb(), level, most, |index, found| {
+        boxes(corners_of(root.aabb()), level, most, |index, found| {
             let Some(node) = nodes.get(index as usize) else { return };
             for child in [node.first_index, node.first_index + 1] {
                 let Some(below) = nodes.get(child as usize) else { continue };
-                let aabb = *below.aabb();
-                found(if below.is_leaf() { Child::Leaf(aabb) } else { Child::Inner(child, aabb) });
+                let corners = corners_of(below.aabb());
+                found(if below.is_leaf() { Child::Leaf(corners) } else { Child::Inner(child, corners) });
             }
         })
     }
@@ -56,7 +49,7 @@ impl DeformingBvh {
 
 /// Walks a tree from its root, level by level. `children`: hands over those of a node.
 fn boxes(
-    root: Aabb,
+    root: (Vec3, Vec3),
     level: u32,
     most: usize,
     children: impl Fn(u32, &mut dyn FnMut(Child)),
@@ -69,14 +62,14 @@ fn boxes(
         }
         for &(index, _) in &inner {
             children(index, &mut |child| match child {
-                Child::Inner(index, aabb) => below.push((index, aabb)),
-                Child::Leaf(aabb) => ended.push(corners_of(&aabb)),
+                Child::Inner(index, corners) => below.push((index, corners)),
+                Child::Leaf(corners) => ended.push(corners),
             });
         }
         inner.clear();
         std::mem::swap(&mut inner, &mut below);
     }
-    ended.extend(inner.iter().map(|(_, aabb)| corners_of(aabb)));
+    ended.extend(inner.iter().map(|&(_, corners)| corners));
     ended.truncate(most);
     ended
 }
@@ -115,7 +108,7 @@ mod tests {
         }
         // Far below the last leaf; all of the leaves.
         let leaves = mesh.boxes(40, usize::MAX);
-        assert!(hold_all(&leaves, triangles) && leaves.len() >= triangles.len() / 3);
+        assert!(hold_all(&leaves, triangles) && leaves.len() >= triangles.len() / 4);
         assert_eq!(mesh.boxes(40, 17).len(), 17);
     }
 

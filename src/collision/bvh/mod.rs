@@ -5,6 +5,8 @@
 //! | `mod` | [`MeshBvh`]: the triangles of a mesh at rest, built once, shared by all that show it |
 //! | `deforming` | [`DeformingBvh`]: the triangles of one surface that is posed, refitted when it moves |
 //! | `boxes` | [`BoxBvh`]: the boxes of all surfaces |
+//! | `wide` | whatever is in the leaves of an eight-wide tree, which `mod` and `boxes` have; `collapse` builds it |
+//! | `packs` | four triangles at once |
 //! | `overlaps` | nothing: [`BoxOverlaps`] tells which of many boxes overlap one |
 //! | `levels` | nothing: the boxes of a tree, to be looked at |
 //! | `within` | nothing: the triangles of a mesh that are in a box |
@@ -12,20 +14,23 @@
 //! obvhs has a glam of its own version; values cross over as arrays, so that no lock file can make them differ.
 
 mod boxes;
+mod collapse;
 mod deforming;
 mod levels;
 mod overlaps;
+mod packs;
+mod wide;
 mod within;
 
 use bevy::prelude::*;
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
-use obvhs::cwbvh::CwBvh;
-use obvhs::cwbvh::builder::build_cwbvh;
 use obvhs::ray::{Ray, RayHit};
 use obvhs::rt_triangle::RtTriangle;
-use obvhs::triangle::Triangle;
 
+use self::collapse::build_wide;
+use self::packs::{PACK, TrianglePack};
+use self::wide::{WideBvh, WideRay};
 use super::{Deformer, MeshTriangles};
 
 pub(super) use boxes::BoxBvh;
@@ -35,11 +40,11 @@ pub(crate) use overlaps::BoxOverlaps;
 /// Above this many triangles a faster build is worth a slower cast.
 const FAST_BUILD_TRIANGLES: usize = 200_000;
 
-/// Triangles of a mesh under an eight-wide compressed BVH. Read-only; shared by all instances of the mesh.
+/// Triangles of a mesh under an eight-wide BVH. Read-only; shared by all instances of the mesh.
 pub struct MeshBvh {
-    bvh: CwBvh,
-    /// In the order of the leaves, so that a leaf reads its triangles in a row.
-    leaves: Vec<RtTriangle>,
+    tree: WideBvh,
+    /// The leaves.
+    packs: Vec<TrianglePack>,
     triangles: MeshTriangles,
     /// If the mesh can be posed: how, and the BVH that poses begin with.
     deforming: Option<(Deformer, DeformingBvh)>,
@@ -57,20 +62,19 @@ pub struct LocalHit {
 impl MeshBvh {
     /// Builds the BVH: about 1 µs per triangle on one core.
     pub fn build(triangles: MeshTriangles) -> Self {
-        let corners: Vec<Triangle> = triangles
-            .positions
-            .iter()
-            .map(|[a, b, c]| Triangle {
-                v0: a.to_array().into(),
-                v1: b.to_array().into(),
-                v2: c.to_array().into(),
-            })
-            .collect();
-        let boxes: Vec<Aabb> = corners.iter().map(Triangle::aabb).collect();
-        let bvh = build_cwbvh(&padded(boxes), quality(corners.len()), &mut default());
-        let leaves =
-            bvh.primitive_indices.iter().map(|&triangle| (&corners[triangle as usize]).into()).collect();
-        Self { bvh, leaves, triangles, deforming: None }
+        let positions = &triangles.positions;
+        let around = |&[a, b, c]: &[Vec3; 3]| Aabb {
+            min: a.min(b).min(c).to_array().into(),
+            max: a.max(b).max(c).to_array().into(),
+        };
+        let boxes = padded(positions.iter().map(around).collect());
+        let mut packs = Vec::with_capacity(positions.len() / 2);
+        let tree = build_wide(&boxes, quality(positions.len()), PACK as u32, |numbers| {
+            packs.push(TrianglePack::new(positions, numbers));
+            packs.len() as u32 - 1
+        });
+        packs.shrink_to_fit();
+        Self { tree, packs, triangles, deforming: None }
     }
 
     /// Adds what surfaces need that show this mesh skinned or morphed, and the BVH that theirs begin with: once more the
@@ -100,11 +104,11 @@ impl MeshBvh {
 
     /// Smallest and largest corner of everything that can be hit, with some rounding errors to spare.
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        corners_of(&self.bvh.total_aabb)
+        self.tree.bounds.unwrap_or_default()
     }
 
-    /// The closest hit on the segment from `start` to `end`, from either side. A segment that is not finite or
-    /// has no length hits nothing.
+    /// The closest hit on the segment from `start` to `end`, from either side; of several in one place the triangle of the
+    /// lowest number. A segment that is not finite or has no length hits nothing.
     pub fn cast(&self, start: Vec3, end: Vec3) -> Option<LocalHit> {
         self.cast_within(Segment::new(start, end)?, 1.0)
     }
@@ -112,11 +116,13 @@ impl MeshBvh {
     /// As [`Self::cast`], but only up to a fraction of the segment.
     #[inline]
     pub(super) fn cast_within(&self, segment: Segment, fraction: f32) -> Option<LocalHit> {
-        let mut hit = RayHit::none();
-        let ray = segment.ray(fraction);
-        self.bvh
-            .ray_traverse(ray, &mut hit, |ray, leaf| intersect(&self.leaves[leaf], ray))
-            .then(|| LocalHit::new(&hit, &self.bvh.primitive_indices))
+        let (ray, end) = (WideRay::new(segment), HEAD_START + fraction);
+        // Nothing is lower: what lies at the very end does not count.
+        let mut triangle = 0;
+        let closest = self
+            .tree
+            .traverse(&ray, end, |pack, end| self.packs[pack as usize].cast(&ray, end, &mut triangle));
+        (closest < end).then_some(LocalHit { fraction: closest - HEAD_START, triangle })
     }
 }
 
@@ -181,10 +187,20 @@ impl Segment {
         (start.is_finite() && delta.is_finite() && delta != Vec3::ZERO).then_some(Self { start, delta })
     }
 
+    /// Where its ray begins.
+    #[inline]
+    fn origin(&self) -> Vec3 {
+        self.start - self.delta * HEAD_START
+    }
+
     #[inline]
     fn ray(&self, fraction: f32) -> Ray {
-        let start = self.start - self.delta * HEAD_START;
-        Ray::new(start.to_array().into(), self.delta.to_array().into(), HEAD_START, HEAD_START + fraction)
+        Ray::new(
+            self.origin().to_array().into(),
+            self.delta.to_array().into(),
+            HEAD_START,
+            HEAD_START + fraction,
+        )
     }
 }
 
@@ -259,5 +275,111 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// In [-1, 1).
+    struct Random(u64);
+
+    impl Random {
+        fn signed(&mut self) -> f32 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 40) as f32 / (1_u32 << 23) as f32 - 1.0
+        }
+
+        fn vector(&mut self) -> Vec3 {
+            Vec3::new(self.signed(), self.signed(), self.signed())
+        }
+
+        /// Triangles of any size up to this one, some of them twice.
+        fn soup(&mut self, count: usize, size: f32) -> Vec<[Vec3; 3]> {
+            let mut soup: Vec<[Vec3; 3]> = Vec::new();
+            while soup.len() < count {
+                let (middle, size) = (self.vector(), size * self.signed());
+                let triangle = [0, 1, 2].map(|_| middle + self.vector() * size);
+                soup.push(if soup.len() % 10 == 9 { soup[soup.len() / 2] } else { triangle });
+            }
+            soup
+        }
+    }
+
+    fn of(positions: Vec<[Vec3; 3]>) -> MeshBvh {
+        MeshBvh::build(MeshTriangles { positions, ..default() })
+    }
+
+    /// The closest of all triangles, the lowest number if there are several.
+    fn brute(positions: &[[Vec3; 3]], start: Vec3, end: Vec3) -> Option<LocalHit> {
+        let ray = Segment::new(start, end)?.ray(1.0);
+        let mut closest = (ray.tmax, 0);
+        for (number, corners) in (0..).zip(positions) {
+            let [v0, v1, v2] = corners.map(|corner| corner.to_array().into());
+            let distance = intersect(&RtTriangle::new(v0, v1, v2), &ray);
+            if distance < closest.0 {
+                closest = (distance, number);
+            }
+        }
+        (closest.0 < ray.tmax).then_some(LocalHit { fraction: closest.0 - HEAD_START, triangle: closest.1 })
+    }
+
+    #[test]
+    fn hits_are_those_of_brute_force_to_the_bit() {
+        let mut random = Random(5);
+        let grid = crate::scenes::meshes::ground(Vec2::splat(2.0), UVec2::splat(16)).unwrap();
+        let grid = MeshTriangles::from_mesh(&grid).unwrap().positions;
+        for positions in
+            [random.soup(1, 1.0), random.soup(7, 1.0), random.soup(600, 0.4), random.soup(3000, 0.05), grid]
+        {
+            let bvh = of(positions.clone());
+            let mut hits = 0;
+            for round in 0..3000 {
+                let corners = positions[round % positions.len()];
+                let (start, end) = match round % 6 {
+                    // From anywhere; short; through a corner, an edge, along an axis; within the plane of a triangle.
+                    0 => (random.vector() * 2.0, random.vector() * 2.0),
+                    1 => (corners[0] + random.vector() * 0.1, corners[1] + random.vector() * 0.1),
+                    2 => {
+                        let start = random.vector() * 2.0;
+                        (start, start + (corners[2] - start) * 1.5)
+                    }
+                    3 => {
+                        let (start, middle) = (random.vector() * 2.0, (corners[0] + corners[1]) * 0.5);
+                        (start, middle * 2.0 - start)
+                    }
+                    4 => {
+                        let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+                        let axis = Vec3::AXES[round / 6 % 3] * random.signed();
+                        (middle - axis, middle + axis)
+                    }
+                    _ => (corners[0], corners[1] * 3.0 - corners[0] - corners[2]),
+                };
+                let hit = bvh.cast(start, end);
+                assert_eq!(hit, brute(&positions, start, end), "from {start} to {end}");
+                hits += u32::from(hit.is_some());
+            }
+            assert!(hits > 500, "{hits} of {} triangles", positions.len());
+        }
+    }
+
+    #[test]
+    fn many_triangles_in_one_place_are_a_mesh() {
+        let mut positions = vec![[Vec3::ZERO, Vec3::X, Vec3::Z]; 1200];
+        positions.push([Vec3::Y, Vec3::Y + Vec3::X, Vec3::Y + Vec3::Z]);
+        let bvh = of(positions);
+        let hit = |from: f32, to: f32| bvh.cast(Vec3::new(0.25, from, 0.25), Vec3::new(0.25, to, 0.25));
+        assert_eq!(hit(0.5, -0.5).map(|hit| hit.triangle), Some(0));
+        assert_eq!(hit(2.0, -0.5).map(|hit| hit.triangle), Some(1200));
+    }
+
+    #[test]
+    fn what_is_no_segment_hits_nothing() {
+        let bvh = of(vec![[Vec3::ZERO, Vec3::X, Vec3::Z]]);
+        let (above, below) = (Vec3::new(0.25, 0.5, 0.25), Vec3::new(0.25, -0.5, 0.25));
+        assert!(bvh.cast(above, below).is_some() && bvh.cast(above, above).is_none());
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            for axis in Vec3::AXES {
+                let bad = above + axis * bad;
+                assert_eq!((bvh.cast(bad, below), bvh.cast(below, bad)), (None, None), "{bad}");
+            }
+        }
+        assert_eq!(of(Vec::new()).cast(above, below), None);
     }
 }

@@ -1,36 +1,30 @@
 //! The triangles in a part of space.
 
 use bevy::prelude::*;
-use obvhs::aabb::Aabb;
 
 use super::MeshBvh;
+use super::wide::Child;
 
 impl MeshBvh {
     /// The triangles whose boxes overlap this one, given by its smallest and largest corner, mesh space; ascending, each once. Some
-    /// beside it are among them, since boxes in the tree are rounded outwards; a corner that is not a number bounds nothing.
+    /// beside it are among them, since up to four share a box in the tree; a corner that is not a number bounds nothing.
     /// `found`: emptied before.
     pub(crate) fn triangles_within(&self, (low, high): (Vec3, Vec3), found: &mut Vec<u32>) {
         found.clear();
-        let wanted = Aabb { min: low.to_array().into(), max: high.to_array().into() };
         let mut waiting = vec![0];
-        while let Some(index) = waiting.pop() {
-            let Some(node) = self.bvh.nodes.get(index as usize) else { continue };
-            for child in (0..8).filter(|&child| !node.is_child_empty(child)) {
-                if !node.child_aabb(child).intersect_aabb(&wanted) {
+        while let Some(node) = waiting.pop() {
+            for (child, (child_low, child_high)) in self.tree.children(node) {
+                // Written so that NaN overlaps.
+                if child_low.cmpgt(high).any() || child_high.cmplt(low).any() {
                     continue;
                 }
-                if node.is_leaf(child) {
-                    let (first, count) = node.child_primitives(child);
-                    let leaf = first as usize..(first + count) as usize;
-                    found.extend(self.bvh.primitive_indices.get(leaf).unwrap_or_default());
-                } else {
-                    waiting.push(node.child_node_index(child));
+                match child {
+                    Child::Inner(index) => waiting.push(index),
+                    Child::Leaf(pack) => found.extend(self.packs[pack as usize].numbers()),
                 }
             }
         }
         found.sort_unstable();
-        // A tree may hold a triangle in two leaves.
-        found.dedup();
     }
 }
 
