@@ -27,7 +27,7 @@ fn load(scene: &Scene, path: &'static str) -> Handle<WeatherEffect> {
 /// Loads an effect that is there.
 fn loaded(scene: &mut Scene, path: &'static str) -> Handle<WeatherEffect> {
     let handle = load(scene, path);
-    scene.wait_until(path, |world| world.resource::<Assets<WeatherEffect>>().contains(&handle));
+    scene.wait_until(path, |scene| scene.0.world().resource::<Assets<WeatherEffect>>().contains(&handle));
     handle
 }
 
@@ -78,7 +78,7 @@ fn an_emitter_whose_effect_cannot_be_had_is_marked_until_it_has_another() {
 
         let mud = loaded(&mut scene, WeatherEffect::MUD);
         scene.0.world_mut().get_mut::<Emitter>(emitter).unwrap().effect = mud;
-        scene.wait_until("no mark", |world| world.get::<NotEmitting>(emitter).is_none());
+        scene.wait_until("no mark", |scene| scene.0.world().get::<NotEmitting>(emitter).is_none());
         scene.run(1);
         scene.run(60);
         assert!(scene.0.world().get::<EmitterState>(emitter).unwrap().emitted > 0, "{path}");
@@ -126,8 +126,8 @@ fn surfaces_tell_once_that_they_are_ready_or_refused() {
         .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
         .with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, vec![[0.0, 0.0], [1.0, 0.0]]);
     let line = spawn(&mut scene, line);
-    scene.wait_until("messages", |world| {
-        let told = world.resource::<Told>();
+    scene.wait_until("messages", |scene| {
+        let told = scene.0.world().resource::<Told>();
         !told.ready.is_empty() && !told.refused.is_empty()
     });
     // It turns, and is measured again.
@@ -149,7 +149,7 @@ fn surfaces_tell_once_that_they_are_ready_or_refused() {
     scene.0.world_mut().entity_mut(floor).remove::<Weatherable>();
     scene.0.update();
     scene.0.world_mut().entity_mut(floor).insert(Weatherable { map_size: 64, ..default() });
-    scene.wait_until("the second time", |world| world.resource::<Told>().ready == [floor, floor]);
+    scene.wait_until("the second time", |scene| scene.0.world().resource::<Told>().ready == [floor, floor]);
 }
 
 #[test]
@@ -157,7 +157,7 @@ fn a_surface_without_room_for_its_maps_is_refused() {
     let mut scene = listening();
     scene.0.world_mut().resource_mut::<MapBudget>().bytes = 1;
     let floor = spawn(&mut scene, plane());
-    scene.wait_until("a refusal", |world| !world.resource::<Told>().refused.is_empty());
+    scene.wait_until("a refusal", |scene| !scene.0.world().resource::<Told>().refused.is_empty());
     let told = scene.0.world().resource::<Told>();
     assert_eq!(told.refused[0], SurfaceRefused { surface: floor, reason: Refusal::NoRoom });
     assert!(told.ready.is_empty());

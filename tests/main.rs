@@ -67,10 +67,10 @@ mod gpu {
     mod particles;
     /// Lights, cameras, meshes.
     mod places;
-    /// Borders of uv islands, as they are drawn.
-    mod seams;
     /// Maps of another size.
     mod resize;
+    /// Borders of uv islands, as they are drawn.
+    mod seams;
     /// Painting.
     mod splat;
     /// Floods, ripples, light through cloth.

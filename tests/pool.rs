@@ -170,9 +170,9 @@ fn who_was_hit_longest_ago_makes_room_and_nothing_is_lost_in_silence() {
 
     let third = spawn(&mut scene, mesh, 64, Vec3::X * 4.0);
     let mut messages = Vec::new();
-    scene.wait_until("a third surface", |world| {
-        messages.extend(world.resource_mut::<Messages<SurfaceEvicted>>().drain());
-        world.get::<SurfaceWater>(third).is_some()
+    scene.wait_until("a third surface", |scene| {
+        messages.extend(scene.0.world_mut().resource_mut::<Messages<SurfaceEvicted>>().drain());
+        has::<SurfaceWater>(scene, third)
     });
     let loss: MapLoss = get(&scene, first);
     assert_eq!(messages, [SurfaceEvicted { surface: first, lost: loss }]);
@@ -254,7 +254,7 @@ fn row(scene: &mut Scene, mesh: &Mesh3d, count: u32, z: f32) -> (Vec<Entity>, Ve
     }
     let budget = scene.0.world().resource::<MapBudget>().bytes;
     let mut told = Vec::new();
-    update_until(scene, "the texels of a row", |scene| {
+    scene.wait_until("the texels of a row", |scene| {
         assert!(pool(scene).reserved <= budget, "{:?}", pool(scene));
         told.extend(resizes(scene));
         plates.iter().all(|&plate| has::<SurfaceWater>(scene, plate))
@@ -315,7 +315,7 @@ fn crowd() -> State {
     }
     scene.run(HZ);
     let before: Vec<u64> = plates.iter().map(|&plate| held(&scene, plate).iter().sum()).collect();
-    update_until(&mut scene, "maps as they were", |scene| sides(scene, &plates) == [128; 12]);
+    scene.wait_until("maps as they were", |scene| sides(scene, &plates) == [128; 12]);
     scene.0.update();
     let counts = pool(&scene);
     assert_eq!((counts.shrinks, counts.growths, counts.reduced, counts.evictions), (7, 7, 0, 0));
@@ -344,24 +344,22 @@ fn only_where_halving_is_not_enough_maps_are_lost() {
     let mesh = add(&mut scene, 0.5);
     let plates: Vec<Entity> =
         [0.0, 1.0, 2.0, 3.0].map(|x| spawn(&mut scene, mesh.clone(), 256, Vec3::X * x)).to_vec();
-    update_until(&mut scene, "the texels", |scene| {
-        plates.iter().all(|&plate| has::<SurfaceWater>(scene, plate))
-    });
+    scene.wait_until("the texels", |scene| plates.iter().all(|&plate| has::<SurfaceWater>(scene, plate)));
     for x in [1.0, 0.0, 2.0, 3.0] {
         drizzle(&mut scene, 600.0, Vec2::splat(0.2), Vec3::X * x);
     }
     let before: Vec<[u64; 2]> = plates.iter().map(|&plate| held(&scene, plate)).collect();
     // All of it comes from the one that was hit longest ago, in one step.
     scene.0.world_mut().resource_mut::<MapBudget>().bytes = 3 * NEED.bytes(256) + NEED.bytes(64);
-    update_until(&mut scene, "one small plate", |scene| sides(scene, &plates) == [256, 64, 256, 256]);
+    scene.wait_until("one small plate", |scene| sides(scene, &plates) == [256, 64, 256, 256]);
     // From all of them.
     scene.0.world_mut().resource_mut::<MapBudget>().bytes = 4 * NEED.bytes(64);
-    update_until(&mut scene, "small plates", |scene| sides(scene, &plates) == [64; 4]);
+    scene.wait_until("small plates", |scene| sides(scene, &plates) == [64; 4]);
     let after: Vec<[u64; 2]> = plates.iter().map(|&plate| held(&scene, plate)).collect();
     assert_eq!((after, pool(&scene).evictions, pool(&scene).shrinks), (before, 0, 4));
     // Nothing is left to be halved.
     scene.0.world_mut().resource_mut::<MapBudget>().bytes = 3 * NEED.bytes(64);
-    update_until(&mut scene, "an eviction", |scene| !has::<MapSize>(scene, plates[1]));
+    scene.wait_until("an eviction", |scene| !has::<MapSize>(scene, plates[1]));
     assert_eq!((pool(&scene).evictions, pool(&scene).shrinks), (1, 4));
     assert!(get::<MapLoss>(&scene, plates[1]).is_lost());
     for &plate in &plates {

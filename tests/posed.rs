@@ -230,8 +230,8 @@ fn wet_and_hanging(scene: &mut Scene) -> (Entity, [Entity; 2]) {
         let [x, y] = (uv * SIZE as f32).to_array().map(|part| part as usize);
         y * SIZE as usize + x
     };
-    scene.wait_until("slopes", |world| {
-        let heights = world.get::<WetGeometry>(surface).unwrap().0.height();
+    scene.wait_until("slopes", |scene| {
+        let heights = scene.0.world().get::<WetGeometry>(surface).unwrap().0.height();
         let fall = heights[texel(Vec2::new(0.1, 0.5))] - heights[texel(Vec2::new(0.95, 0.5))];
         (fall - 0.9).abs() < 0.02
     });

@@ -7,8 +7,8 @@
 //! What is no amount is taken from the texel that held most: the times, the reserve, the nearness to a rim, whose the water was.
 //! How wet it looked, and marks, are means over what lay there.
 
-use super::surface::Tiles;
 use super::texel::TexelWater;
+use super::tiles::Tiles;
 use super::{Ledger, Marks, Origin, SurfaceWater, TexelGeometry};
 use crate::overlay::TILE_SIZE;
 

@@ -57,13 +57,13 @@ impl Scene {
 
     /// Runs frames without ticks until an entity has something that is worked out in the background.
     pub fn wait_for<C: Component>(&mut self, entity: Entity) {
-        self.wait_until(std::any::type_name::<C>(), |world| world.get::<C>(entity).is_some());
+        self.wait_until(std::any::type_name::<C>(), |scene| scene.0.world().get::<C>(entity).is_some());
     }
 
     /// Runs frames without ticks until something is so.
-    pub fn wait_until(&mut self, what: &str, mut is_so: impl FnMut(&mut World) -> bool) {
+    pub fn wait_until(&mut self, what: &str, mut is_so: impl FnMut(&mut Self) -> bool) {
         for _ in 0..100_000 {
-            if is_so(self.0.world_mut()) {
+            if is_so(self) {
                 return;
             }
             self.0.update();

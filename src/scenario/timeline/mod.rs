@@ -15,6 +15,8 @@ mod events;
 mod expect;
 mod steps;
 
+use bevy::prelude::*;
+
 use super::motion::{EmitterMotion, Leg, pose};
 use super::{CameraKey, EmitterKey, EmitterSpec, Scenario};
 use steps::Timeline;

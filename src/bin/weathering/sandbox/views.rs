@@ -9,9 +9,9 @@ use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use bevy_egui::egui;
 use bevy_weathering::collision::{CollisionScene, MeshBvh, MeshTriangles, SurfaceCollider};
 use bevy_weathering::emitter::{Emitter, EmitterShape};
+use bevy_weathering::save::RemovedEmitter;
 use bevy_weathering::weather::Weather;
 
-use super::added::Removed;
 use super::probe::Probed;
 use super::selection::Selected;
 use super::settings::{Settings, Tool};
@@ -113,7 +113,7 @@ fn find_seams(triangles: &MeshTriangles) -> Vec<[Vec3; 2]> {
 
 fn draw_emitters(
     settings: Res<Settings>,
-    emitters: Query<(&Emitter, &GlobalTransform), Without<Removed>>,
+    emitters: Query<(&Emitter, &GlobalTransform), Without<RemovedEmitter>>,
     mut gizmos: Gizmos,
 ) {
     if !settings.views.emitters {
