@@ -50,7 +50,8 @@ fn point(
     mut pointed: ResMut<Pointed>,
 ) {
     pointed.pressed = buttons.just_pressed(MouseButton::Left) && !input.pointer;
-    pointed.held = buttons.pressed(MouseButton::Left) && (pointed.held || pointed.pressed);
+    // A click within one slow frame is seen pressed and let go of, and counts for that frame.
+    pointed.held = pointed.pressed || (pointed.held && buttons.pressed(MouseButton::Left));
     let cursor = window.single().ok().and_then(Window::cursor_position);
     pointed.ray = cursor.zip(cameras.iter().next()).and_then(|(cursor, (camera, transform))| {
         // The part of the window that is another camera's is not pointed at.
