@@ -4,8 +4,10 @@ use super::drop::drop_file;
 use super::keys::{SCENARIO, floor_part};
 use super::screen::{Sandbox, Scenery, Screen, wait_for};
 
-/// Column of the screen in which the fields of the panel are found.
-const COLUMN: u32 = 250;
+/// Column of the screen in which fields of the panel are found, behind what is written in them.
+const COLUMN: u32 = 210;
+/// Column in which they are clicked: the mouse is drawn, too.
+const MOUSE: u32 = 260;
 
 /// Whether the title names the file, and what it does.
 fn shows(sandbox: &Sandbox, file: &str, state: &str) -> bool {
@@ -23,7 +25,7 @@ fn field(screen: &Screen) -> Option<u32> {
 /// Types a path in place of what is there.
 fn enter(screen: &Screen, sandbox: &Sandbox, path: &str) {
     let top = wait_for("the field", || field(screen));
-    sandbox.click([COLUMN, top + 10]);
+    sandbox.click([MOUSE, top + 10]);
     // A field that is being edited has a light frame.
     wait_for("the field to be edited", || {
         let picture = screen.picture();
