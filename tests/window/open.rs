@@ -33,8 +33,9 @@ fn enter(screen: &Screen, sandbox: &Sandbox, path: &str) {
         (top - 3..top + 2).any(is_light).then_some(())
     });
     // Not Ctrl+A: a slow frame does not see Ctrl beside a key that was let go of with it.
-    sandbox.xdotool(&["key", "--delay", "20", "End"]);
-    sandbox.xdotool(&["key", "--delay", "5", "--repeat", "30", "BackSpace"]);
+    let mut erase = vec!["key", "--delay", "10", "End"];
+    erase.extend(["BackSpace"; 30]);
+    sandbox.xdotool(&erase);
     sandbox.xdotool(&["type", "--delay", "20", path]);
     sandbox.key("Return");
 }

@@ -8,7 +8,7 @@ const MIDDLE: [u32; 2] = [480, 270];
 /// Left, top, width and height of what is shown of a map, before anything has been asked.
 const MAP: [u32; 4] = [700, 300, 240, 200];
 /// Maps, by their buttons.
-const FILM: [u32; 2] = [785, 196];
+const ABSORBED: [u32; 2] = [845, 196];
 const SOURCE: [u32; 2] = [856, 223];
 const SNOW: [u32; 2] = [758, 250];
 
@@ -67,8 +67,8 @@ fn maps_and_the_probe_tell_of_a_stroke_and_of_a_jet_and_the_stroke_is_taken_back
     wait_for("a map of what looks wet", || (lit(&screen)[0] > 0.0005).then_some(()));
     sandbox.click(SNOW);
     wait_for("a map of no snow", || (lit(&screen)[0] == 0.0).then_some(()));
-    sandbox.click(FILM);
-    wait_for("a map of the film", || (lit(&screen)[0] > 0.0005).then_some(()));
+    sandbox.click(ABSORBED);
+    wait_for("a map of what is absorbed", || (lit(&screen)[0] > 0.0005).then_some(()));
     // What a brush has brought is white.
     sandbox.click(SOURCE);
     wait_for("a map of where it came from", || {
