@@ -130,10 +130,16 @@ mod wetmap;
 mod wetting;
 /// The sandbox in a real window, with real keys.
 mod window {
+    /// What is seen from where, and beside what.
+    mod camera;
+    /// Files that are dropped on it.
+    mod drop;
     /// Keys and mouse.
     mod keys;
     /// Leaving while a scene is saved.
     mod leave;
+    /// Other scenes.
+    mod open;
     /// More particles than the machine can do.
     mod overload;
     /// What panels look like.
@@ -142,4 +148,8 @@ mod window {
     mod screen;
     /// The first picture, and files that change.
     mod start;
+    /// Ticks, speeds, sequences.
+    mod time;
+    /// Probe, brush and maps.
+    mod tools;
 }

@@ -20,13 +20,13 @@ fn sum(pixel: &image::Rgb<u8>) -> u32 {
 }
 
 /// Part of the pixels that show the floor, which is redder than the sky.
-fn floor_part(picture: &image::RgbImage) -> f64 {
+pub fn floor_part(picture: &image::RgbImage) -> f64 {
     let floor = picture.pixels().filter(|pixel| pixel.0[0] > pixel.0[2] + 15).count();
     floor as f64 / picture.pixels().len() as f64
 }
 
 /// Part of the pixels that are at least a tenth darker than before.
-fn darker_part(picture: &image::RgbImage, before: &image::RgbImage) -> f64 {
+pub fn darker_part(picture: &image::RgbImage, before: &image::RgbImage) -> f64 {
     let darker = picture.pixels().zip(before.pixels()).filter(|(now, then)| 10 * sum(now) < 9 * sum(then));
     darker.count() as f64 / picture.pixels().len() as f64
 }

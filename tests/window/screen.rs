@@ -73,6 +73,11 @@ impl Screen {
         Some(Self { _server: server, display: format!(":{}", number.trim()), memory })
     }
 
+    /// What the server is called.
+    pub fn display(&self) -> &str {
+        &self.display
+    }
+
     /// What `xdotool` answers.
     pub fn xdotool(&self, arguments: &[&str]) -> String {
         let output = Command::new("xdotool").env("DISPLAY", &self.display).args(arguments).output();
@@ -96,6 +101,20 @@ impl Screen {
         image::RgbImage::from_fn(width as u32, height as u32, |x, y| {
             let at = y as usize * row + 4 * x as usize;
             image::Rgb([bytes[at + 2], bytes[at + 1], bytes[at]])
+        })
+    }
+
+    /// A part of the scene that panels leave free, without what is told below.
+    pub fn scene(&self) -> image::RgbImage {
+        image::imageops::crop_imm(&self.picture(), 395, 70, 275, 350).to_image()
+    }
+
+    /// The same when it stands still: it takes a slow program some time to draw what it was told last.
+    pub fn still_scene(&self) -> image::RgbImage {
+        wait_for("a scene that stands still", || {
+            let scene = self.scene();
+            std::thread::sleep(Duration::from_millis(700));
+            (scene == self.scene()).then_some(scene)
         })
     }
 
@@ -160,16 +179,32 @@ impl Scenery {
         self.folder.path().join("hose.effect.ron")
     }
 
+    /// A copy of a shipped file under another name.
+    pub fn copy(&self, shipped: &str, name: &str) -> PathBuf {
+        let copy = self.folder.path().join(name);
+        fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join("assets").join(shipped), &copy).unwrap();
+        copy
+    }
+
     /// Pictures and saved scenes.
     pub fn out(&self) -> PathBuf {
         self.folder.path().join("out")
     }
 
+    fn settings(&self) -> PathBuf {
+        self.folder.path().join("config/bevy_weathering/settings.ron")
+    }
+
     /// What the program is to remember of a time before.
     pub fn remember(&self, settings: &str) {
-        let folder = self.folder.path().join("config/bevy_weathering");
-        fs::create_dir_all(&folder).unwrap();
-        fs::write(folder.join("settings.ron"), settings).unwrap();
+        let file = self.settings();
+        fs::create_dir_all(file.parent().unwrap()).unwrap();
+        fs::write(file, settings).unwrap();
+    }
+
+    /// What the program remembers for another time.
+    pub fn remembered(&self) -> String {
+        fs::read_to_string(self.settings()).unwrap()
     }
 
     /// What the program said since it was started last.
@@ -253,6 +288,51 @@ impl<'a> Sandbox<'a> {
     pub fn says(&mut self, what: &str) {
         let scenery = self.scenery;
         self.wait_for(what, |_| scenery.log().contains(what).then_some(()));
+    }
+
+    /// Does something, and waits until the log has another line with this, which is returned from there on.
+    pub fn answer(&mut self, what: &str, ask: impl FnOnce(&Self)) -> String {
+        let scenery = self.scenery;
+        let before = scenery.log().matches(what).count();
+        ask(self);
+        self.wait_for(what, |_| {
+            let log = scenery.log();
+            let (at, _) = log.match_indices(what).nth(before)?;
+            // Not a line of which only a part is written.
+            let (line, _) = log[at..].split_once('\n')?;
+            Some(line.to_owned())
+        })
+    }
+
+    /// Waits until a frame has seen all that was done so far: two keys that undo each other are answered.
+    pub fn seen(&mut self) {
+        for key in ["period", "comma"] {
+            self.answer(" times as fast as in the world", |sandbox| sandbox.key(key));
+        }
+    }
+
+    /// What X calls the window.
+    pub fn window(&self) -> u32 {
+        self.window.parse().unwrap()
+    }
+
+    /// Moves the mouse to a place and clicks the left button. In the scene that is lost if the last frame saw the mouse in a panel.
+    pub fn click(&self, [x, y]: [u32; 2]) {
+        self.xdotool(&["mousemove", &x.to_string(), &y.to_string(), "click", "1"]);
+    }
+
+    /// Drags with a button from a place by so much, in steps that a slow program sees one by one.
+    pub fn drag(&self, button: &str, [x, y]: [u32; 2], [right, down]: [i32; 2]) {
+        const STEPS: i32 = 6;
+        self.xdotool(&["mousemove", &x.to_string(), &y.to_string(), "mousedown", button]);
+        let step = [right / STEPS, down / STEPS].map(|along| along.to_string());
+        for _ in 0..STEPS {
+            std::thread::sleep(Duration::from_millis(60));
+            // What is below zero looks like an option.
+            self.xdotool(&["mousemove_relative", "--", &step[0], &step[1]]);
+        }
+        std::thread::sleep(Duration::from_millis(60));
+        self.xdotool(&["mouseup", button]);
     }
 
     /// Presses F12 and waits for the picture.

@@ -49,11 +49,9 @@ fn point(
     cameras: Query<(&Camera, &GlobalTransform), With<View>>,
     mut pointed: ResMut<Pointed>,
 ) {
-    let is_pressed = buttons.just_pressed(MouseButton::Left);
-    pointed.pressed = is_pressed && !input.pointer;
-    // Also where a slow frame has seen it pressed and let go of: then for that frame.
-    let is_held = buttons.pressed(MouseButton::Left) && pointed.held;
-    pointed.held = if is_pressed { pointed.pressed } else { is_held };
+    pointed.pressed = buttons.just_pressed(MouseButton::Left) && !input.pointer;
+    // A click within one slow frame is seen pressed and let go of, and counts for that frame.
+    pointed.held = pointed.pressed || (pointed.held && buttons.pressed(MouseButton::Left));
     let cursor = window.single().ok().and_then(Window::cursor_position);
     pointed.ray = cursor.zip(cameras.iter().next()).and_then(|(cursor, (camera, transform))| {
         // The part of the window that is another camera's is not pointed at.

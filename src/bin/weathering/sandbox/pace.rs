@@ -87,10 +87,14 @@ fn toggle(world: &mut World) {
 
 /// One tick, and no other after it.
 fn one_tick(world: &mut World) {
-    if !is_held(world) {
-        world.resource_mut::<Time<Virtual>>().pause();
-        world.run_schedule(WeatheringTick);
+    if is_held(world) {
+        return;
     }
+    world.resource_mut::<Time<Virtual>>().pause();
+    world.run_schedule(WeatheringTick);
+    let clock = world.resource::<WeatheringClock>();
+    let told = format!("tick {}, {:.3} s", clock.tick(), clock.seconds());
+    world.resource_mut::<Note>().tell(told);
 }
 
 /// Dry, at the first tick.

@@ -1,4 +1,5 @@
-//! Asking a place how wet it is, since when, and from which emitter.
+//! Asking a place how wet it is, since when, and from which emitter. The panel shows it as it changes; what a click has found is
+//! in the log, too.
 
 use bevy::prelude::*;
 use bevy_egui::egui;
@@ -41,7 +42,7 @@ struct Texel {
 pub fn plugin(app: &mut App) {
     app.init_resource::<Probed>()
         .init_resource::<Reading>()
-        .add_systems(Update, (ask, read).chain())
+        .add_systems(Update, (ask, read, tell.run_if(is_clicked)).chain())
         .add_panel(Place::Maps, "probe", show);
 }
 
@@ -101,42 +102,106 @@ fn read(
     });
 }
 
+/// Whether a place was asked by a click in this frame; not while the button is held.
+fn is_clicked(pointed: Res<Pointed>, probed: Res<Probed>) -> bool {
+    pointed.pressed && probed.is_changed()
+}
+
+/// For whoever keeps what was found, or cannot read the panel.
+fn tell(world: &World) {
+    let found = world.resource::<Probed>().0.zip(world.resource::<Reading>().0.as_ref());
+    if let Some((hit, texel)) = found {
+        let rows = rows(world, &hit, texel);
+        let rows: Vec<String> = rows.iter().map(|(label, value)| format!("{label} {value}")).collect();
+        info!("probe: {}", rows.join("; "));
+    }
+}
+
+/// All that there is to say of a place.
+fn rows(world: &World, hit: &SceneHit, texel: &Texel) -> Vec<(&'static str, String)> {
+    let Wetness { wetness, film_mm, absorbed_mm, saturation } = texel.wetness;
+    let ago = |seconds: f64| format!("{seconds:.1} s ago");
+    let mut rows = vec![
+        ("surface", name_of(world, hit.surface)),
+        ("texel", format!("{} {}", texel.at[0], texel.at[1])),
+        ("uv", format!("{:.4} {:.4}", hit.uv.x, hit.uv.y)),
+        ("place, m", format!("{:.3} {:.3} {:.3}", hit.point.x, hit.point.y, hit.point.z)),
+        ("looks wet", format!("{:.0} %", wetness * 100.0)),
+        ("film", format!("{film_mm:.4} mm")),
+        ("absorbed", format!("{absorbed_mm:.4} mm")),
+        ("pores full", format!("{:.0} %", saturation * 100.0)),
+        ("last moved", texel.moved.map_or_else(|| "never wet".to_owned(), ago)),
+    ];
+    if let Some((origin, since)) = texel.origin {
+        rows.push(("wet since", since.map_or_else(|| "longer than is known".to_owned(), ago)));
+        rows.push(("water from", sources::name(world, origin.source)));
+    }
+    let [dust, mud, snow] = texel.matter_mm;
+    rows.push(("dust", format!("{dust:.4} mm")));
+    rows.push(("mud", format!("{mud:.4} mm")));
+    rows.push(("snow, as water", format!("{snow:.4} mm")));
+    rows
+}
+
 fn show(ui: &mut egui::Ui, world: &mut World) {
     ui.heading("Probe");
     let Some(hit) = world.resource::<Probed>().0 else {
         ui.label("Choose the probe (I) and click into the scene.");
         return;
     };
-    let name = name_of(world, hit.surface);
     let Some(texel) = &world.resource::<Reading>().0 else {
         ui.label("The place has gone.");
         return;
     };
-    let source = texel.origin.map(|(origin, _)| sources::name(world, origin.source));
     egui::Grid::new("probe").num_columns(2).striped(true).show(ui, |ui| {
-        let mut row = |label: &str, value: String| {
+        for (label, value) in rows(world, &hit, texel) {
             ui.label(label);
             ui.monospace(value);
             ui.end_row();
-        };
-        let Wetness { wetness, film_mm, absorbed_mm, saturation } = texel.wetness;
-        row("surface", name);
-        row("texel", format!("{} {}", texel.at[0], texel.at[1]));
-        row("uv", format!("{:.4} {:.4}", hit.uv.x, hit.uv.y));
-        row("place, m", format!("{:.3} {:.3} {:.3}", hit.point.x, hit.point.y, hit.point.z));
-        row("looks wet", format!("{:.0} %", wetness * 100.0));
-        row("film", format!("{film_mm:.4} mm"));
-        row("absorbed", format!("{absorbed_mm:.4} mm"));
-        row("pores full", format!("{:.0} %", saturation * 100.0));
-        let ago = |seconds: f64| format!("{seconds:.1} s ago");
-        row("last moved", texel.moved.map_or_else(|| "never wet".to_owned(), ago));
-        if let (Some((_, since)), Some(source)) = (texel.origin, source) {
-            row("wet since", since.map_or_else(|| "longer than is known".to_owned(), ago));
-            row("water from", source);
         }
-        let [dust, mud, snow] = texel.matter_mm;
-        row("dust", format!("{dust:.4} mm"));
-        row("mud", format!("{mud:.4} mm"));
-        row("snow, as water", format!("{snow:.4} mm"));
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy_weathering::emitter::Source;
+
+    use super::*;
+
+    #[test]
+    fn whose_water_it_is_is_said_of_what_is_wet() {
+        let mut world = World::new();
+        let hit = SceneHit {
+            surface: world.spawn(Name::new("wall")).id(),
+            fraction: 0.5,
+            triangle: 0,
+            point: Vec3::new(1.0, 2.0, 3.0),
+            normal: Vec3::Y,
+            uv: Vec2::splat(0.25),
+            uv_per_metre: Vec2::ONE,
+            along: [Vec3::X, Vec3::Z],
+            back: false,
+        };
+        let mut texel = Texel {
+            wetness: Wetness::default(),
+            at: [3, 4],
+            moved: None,
+            origin: None,
+            matter_mm: [0.0, 0.5, 0.0],
+        };
+        let says = |texel: &Texel, label: &str| {
+            let rows = rows(&world, &hit, texel);
+            rows.into_iter().find_map(|(other, value)| (other == label).then_some(value))
+        };
+        assert_eq!(says(&texel, "surface").as_deref(), Some("wall"));
+        assert_eq!(says(&texel, "place, m").as_deref(), Some("1.000 2.000 3.000"));
+        assert_eq!(says(&texel, "mud").as_deref(), Some("0.5000 mm"));
+        assert_eq!(says(&texel, "last moved").as_deref(), Some("never wet"));
+        assert_eq!((says(&texel, "wet since"), says(&texel, "water from")), (None, None));
+        texel.moved = Some(1.0);
+        texel.origin = Some((Origin { source: Source::BY_HAND, since: 60 }, Some(2.0)));
+        assert_eq!(says(&texel, "last moved").as_deref(), Some("1.0 s ago"));
+        assert_eq!(says(&texel, "wet since").as_deref(), Some("2.0 s ago"));
+        assert_eq!(says(&texel, "water from").as_deref(), Some("a brush"));
+    }
 }
