@@ -214,20 +214,8 @@ pub(super) fn measure_frames(
     surfaces: Query<Measurable>,
 ) {
     let work = work.bypass_change_detection();
-    work.tasks.retain(|entity, Measuring { layout, task, asked_at }| {
-        let Some(frames) = timer.take(task, *asked_at) else { return true };
-        // What was another shape in the meantime is measured again.
-        if surfaces.get(*entity).is_ok_and(|(_, _, current, ..)| Arc::ptr_eq(current.0.layout(), layout)) {
-            let measured = SurfaceFrames(Arc::new(frames), layout.clone());
-            commands.entity(*entity).insert(measured);
-        }
-        false
-    });
     let paints = effects.rows().iter().filter_map(|row| row.effect.as_ref()).any(WeatherEffect::paints);
-    if !paints {
-        return;
-    }
-    for (entity, surface, geometry, collider, frames) in &surfaces {
+    for (entity, surface, geometry, collider, frames) in surfaces.iter().filter(|_| paints) {
         let layout = geometry.0.layout();
         let measured = frames.is_some_and(|frames| Arc::ptr_eq(&frames.1, layout));
         let wanted = surface.stamps == StampSpace::Surface;
@@ -240,6 +228,16 @@ pub(super) fn measure_frames(
         let measuring = Measuring { layout: layout.clone(), task: Some(task), asked_at: timer.tick() };
         work.tasks.insert(entity, measuring);
     }
+    // Last: what is inserted now is seen from the next frame on.
+    work.tasks.retain(|entity, Measuring { layout, task, asked_at }| {
+        let Some(frames) = timer.take(task, *asked_at) else { return true };
+        // What was another shape in the meantime is measured again.
+        if surfaces.get(*entity).is_ok_and(|(_, _, current, ..)| Arc::ptr_eq(current.0.layout(), layout)) {
+            let measured = SurfaceFrames(Arc::new(frames), layout.clone());
+            commands.entity(*entity).insert(measured);
+        }
+        false
+    });
 }
 
 /// A surface without maps has no marks any more.
