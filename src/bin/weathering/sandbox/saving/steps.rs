@@ -17,7 +17,7 @@ use super::super::leave::Leaving;
 use super::super::open::Opened;
 use super::super::ui::Note;
 use super::super::undo::Undo;
-use super::{Purpose, SETTLE, Saving, Step};
+use super::{Purpose, SETTLE, Saving, Step, panel};
 
 /// What of the sandbox's own is not to be saved, nor in the way of what was.
 fn put_tools_away(world: &mut World) {
@@ -169,13 +169,20 @@ fn take(world: &mut World, purpose: Purpose, colors: Vec<ColorMaps>) -> Option<S
     // One may have been taken in hand since; time has stood still.
     put_tools_away(world);
     let scenario: LoadedScenario = world.resource::<Opened>().loaded.clone();
-    // Sliders have been at them.
-    let scene = SavedScene::capture(world, &scenario, colors).with_materials(world).with_emitters(world);
+    let scene = match panel::obstacle(world) {
+        // Somebody has been quick.
+        Some(why) => Err(why.to_owned()),
+        // Sliders have been at them.
+        None => SavedScene::capture(world, &scenario, colors)
+            .with_materials(world)
+            .with_emitters(world)
+            .map_err(|error| error.to_string()),
+    };
     let scene = match scene {
         Ok(scene) => scene,
-        Err(error) => {
+        Err(why) => {
             world.resource_mut::<Leaving>().0 = false;
-            world.resource_mut::<Note>().complain(error.to_string());
+            world.resource_mut::<Note>().complain(why);
             return None;
         }
     };
