@@ -1,5 +1,6 @@
 //! The program again: scenes that are saved and gone on with, and where all the water is in the end.
 
+use std::any::TypeId;
 use std::fs;
 use std::path::Path;
 
@@ -290,6 +291,51 @@ fn an_emitter_that_was_removed_stays_so_in_what_is_saved() {
     let rain = emitter(world, "rain");
     assert!(world.get::<RemovedEmitter>(rain).is_some() && !world.get::<Emitter>(rain).unwrap().enabled);
     assert_eq!(world.get::<EmitterState>(rain).unwrap().emitted, 0);
+    // Editors can show them.
+    let types = world.resource::<AppTypeRegistry>().read();
+    assert!(types.contains(TypeId::of::<AddedEmitter>()) && types.contains(TypeId::of::<RemovedEmitter>()));
+}
+
+#[test]
+fn effects_of_the_scenario_that_were_edited_are_kept_and_others_are_as_in_their_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = Scenario::load(&ten_minutes(folder.path())).unwrap();
+    let volume = |app: &mut App, edit: Option<f32>| {
+        let world = app.world_mut();
+        let rain = emitter(world, "rain");
+        let effect = world.get::<Emitter>(rain).unwrap().effect.clone();
+        let mut effects = world.resource_mut::<Assets<WeatherEffect>>();
+        if let Some(volume_mm3) = edit {
+            effects.get_mut(&effect).unwrap().volume_mm3 = volume_mm3;
+        }
+        effects.get(&effect).unwrap().volume_mm3
+    };
+    let mut edited = ready(scenario.clone());
+    let before = with_emitters(edited.world_mut(), &scenario);
+    let in_file = volume(&mut edited, None);
+    assert_ne!(volume(&mut edited, Some(123.5)), in_file);
+    let kept = folder.path().join("kept");
+    with_emitters(edited.world_mut(), &scenario).write(&kept).unwrap();
+
+    let mut other = ready(scenario.clone());
+    SavedScene::read(&kept).unwrap().restore(other.world_mut(), &scenario, &kept).unwrap();
+    assert_eq!(volume(&mut other, None), 123.5);
+    before.restore(other.world_mut(), &scenario, &kept).unwrap();
+    assert_eq!(volume(&mut other, None), in_file);
+    let state = kept.join("state.ron");
+    let text = fs::read_to_string(&state).unwrap();
+    let (before, settings) = text.split_once("edited:").unwrap();
+    for (was, is, named) in [
+        ("volume_mm3:123.5", "volume_mm3:-1.0", "`settings.edited[0].text`"),
+        ("stream: 0", "stream: 7", "`settings.edited[0].stream` is 7"),
+    ] {
+        assert!(settings.contains(was), "{was} is not in {settings}");
+        fs::write(&state, format!("{before}edited:{}", settings.replacen(was, is, 1))).unwrap();
+        let scene = SavedScene::read(&kept).unwrap();
+        let refused = scene.restore(other.world_mut(), &scenario, &kept).unwrap_err().to_string();
+        assert!(refused.contains(named), "{was}: {refused}");
+    }
+    assert_eq!(volume(&mut other, None), in_file);
 }
 
 #[test]

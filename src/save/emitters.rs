@@ -1,9 +1,4 @@
 //! Emitters as somebody has set them, and those that were added: what no scenario says.
-//!
-//! Particles and emitters of a saved scene name their effects by number: first those that drips have, then the scenario's, an emitter
-//! after the other, then those that nobody but the session has, whose texts are kept. In another world the rows of the
-//! [`EffectTable`] may be in another order; so numbers are found by handles when a scene is taken, and rows by numbers when it is
-//! put back.
 
 use std::f32::consts::PI;
 use std::path::Path;
@@ -11,13 +6,12 @@ use std::path::Path;
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::maps::{STATE, value};
+use super::effects::{EditedEffect, Effects, Numbers};
+use super::maps::value;
 use super::{SaveError, SceneState, emitters_in_order};
 use crate::effect::{EffectTable, WeatherEffect};
 use crate::emitter::{Emitter, EmitterShape, Flow};
-use crate::particle::SavedParticle;
-use crate::scenario::{ByHand, OwnEffect, Scenario, SceneEntity};
-use crate::wetting::DripEffect;
+use crate::scenario::{ByHand, Scenario, SceneEntity};
 
 /// The largest length and the farthest place, metres.
 const FAR: f32 = 1.0e5;
@@ -39,6 +33,9 @@ pub struct RemovedEmitter;
 pub(crate) struct EmitterSettings {
     /// Texts of effects, in the order of their numbers behind the scenario's.
     effects: Vec<String>,
+    /// Of the scenario's own, those that somebody has edited.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    edited: Vec<EditedEffect>,
     /// In the order of their streams.
     emitters: Vec<EmitterSetting>,
 }
@@ -76,51 +73,9 @@ enum Role {
     Added,
 }
 
-/// The effects that need no text, in the order of their numbers.
-fn own_effects(world: &mut World) -> Vec<Handle<WeatherEffect>> {
-    let mut emitters = world.query::<(&Emitter, &OwnEffect)>();
-    let mut order: Vec<_> = emitters.iter(world).map(|(emitter, own)| (emitter.stream, own)).collect();
-    order.sort_by_key(|(stream, _)| *stream);
-    let drips = world.get_resource::<DripEffect>().filter(|drips| drips.rows.is_some());
-    let drips = drips.into_iter().flat_map(|drips| drips.handles.iter().cloned());
-    drips.chain(order.into_iter().map(|(_, own)| own.0.clone())).collect()
-}
-
-/// Numbers of effects.
-struct Numbers {
-    /// By number.
-    handles: Vec<Handle<WeatherEffect>>,
-    /// By row of the table: what was found already.
-    of_rows: Vec<Option<u16>>,
-}
-
-impl Numbers {
-    fn of(&mut self, handle: &Handle<WeatherEffect>) -> u16 {
-        let found = self.handles.iter().position(|other| other == handle);
-        found.unwrap_or_else(|| {
-            self.handles.push(handle.clone());
-            self.handles.len() - 1
-        }) as u16
-    }
-
-    fn of_row(&mut self, row: u16, table: &EffectTable) -> u16 {
-        let at = usize::from(row);
-        let Some(effect) = table.rows().get(at) else { return row };
-        if let Some(known) = self.of_rows[at] {
-            return known;
-        }
-        let number = self.of(&effect.handle);
-        self.of_rows[at] = Some(number);
-        number
-    }
-}
-
 /// Adds to a scene that has just been taken what its emitters are, and gives its effects their numbers.
 pub(super) fn take(world: &mut World, state: &mut SceneState) -> Result<(), SaveError> {
-    let own = own_effects(world);
-    let (count, order) = (own.len(), emitters_in_order(world));
-    let table = world.resource::<EffectTable>();
-    let mut numbers = Numbers { handles: own, of_rows: vec![None; table.rows().len()] };
+    let (mut numbers, order) = (Numbers::new(world), emitters_in_order(world));
     let mut emitters = Vec::new();
     for entity in order {
         let of = world.entity(entity);
@@ -151,29 +106,13 @@ pub(super) fn take(world: &mut World, state: &mut SceneState) -> Result<(), Save
             rotation: place.rotation,
         });
     }
+    let table = world.resource::<EffectTable>();
     for particle in state.particles.iter_mut().chain(&mut state.waiting) {
         particle.effect = numbers.of_row(particle.effect, table);
     }
-    let texts = numbers.handles[count..].iter().map(|handle| text_of(world, handle));
-    let effects = texts.collect::<Result<Vec<_>, _>>()?;
-    state.settings = Some(EmitterSettings { effects, emitters });
+    let (effects, edited) = numbers.texts(world)?;
+    state.settings = Some(EmitterSettings { effects, edited, emitters });
     Ok(())
-}
-
-/// The text of an effect as it is now.
-fn text_of(world: &World, handle: &Handle<WeatherEffect>) -> Result<String, SaveError> {
-    let path = Path::new(STATE);
-    let refused = |what: &str, expected: &str| value(path, "settings.effects", what, expected.into());
-    let asset = world.get_resource::<Assets<WeatherEffect>>().and_then(|effects| effects.get(handle));
-    let in_table = || {
-        let rows = world.resource::<EffectTable>().rows();
-        rows.iter().find(|row| row.handle == *handle)?.effect.as_ref()
-    };
-    let effect = asset.or_else(in_table).ok_or_else(|| refused("not loaded", "effects that are there"))?;
-    if let Some(file) = effect.stamps.files().next() {
-        return Err(refused(file, "an effect that names no pictures, which no saved scene takes along"));
-    }
-    effect.to_ron().map_err(|source| SaveError::Encode { path: path.into(), source: source.into() })
 }
 
 impl EmitterSettings {
@@ -182,35 +121,21 @@ impl EmitterSettings {
         self.emitters.iter().filter(|setting| setting.role == Role::Added).count()
     }
 
-    /// Checks all of it for a world that has so many emitters of a scenario; returns the effects that the texts are, and how many
-    /// effects have numbers. `states`: how many emitters the scene has.
+    /// Checks all of it for a world that has so many emitters of a scenario; returns the effects that the texts are. `states`: how
+    /// many emitters the scene has.
     pub(super) fn check(
         &self,
         world: &mut World,
         (scenario, states): (usize, usize),
         path: &Path,
-    ) -> Result<(Vec<WeatherEffect>, usize), SaveError> {
-        let of_all = |what: &str, count: usize, expected: String| {
-            Err(value(path, &format!("settings.{what}"), count, expected))
-        };
+    ) -> Result<Effects, SaveError> {
         let (count, added) = (self.emitters.len(), self.added());
         if count != states || count - added != scenario || added > Scenario::MAX_EMITTERS {
             let expected = format!("{states} of them, {scenario} of the scenario's");
-            return of_all("emitters", count, expected);
+            return Err(value(path, "settings.emitters", count, expected));
         }
-        let rows = world.resource::<EffectTable>().rows().len();
-        if rows + self.effects.len() > usize::from(u16::MAX) {
-            return of_all("effects", self.effects.len(), "few enough for the table of effects".into());
-        }
-        let mut effects = Vec::new();
-        for (index, text) in self.effects.iter().enumerate() {
-            let read = WeatherEffect::from_ron(text.as_bytes()).and_then(WeatherEffect::with_stamps);
-            let field = format!("settings.effects[{index}]");
-            effects.push(read.map_err(|error| {
-                value(path, &field, "unusable", format!("the text of an effect that can be used: {error}"))
-            })?);
-        }
-        let numbers = own_effects(world).len() + effects.len();
+        let effects = Effects::read(world, &self.effects, &self.edited, path)?;
+        let numbers = effects.numbers;
         let mut least = 0;
         for (index, setting) in self.emitters.iter().enumerate() {
             let field = |name: &str| format!("settings.emitters[{index}].{name}");
@@ -235,22 +160,17 @@ impl EmitterSettings {
                 return Err(value(path, &field("rotation"), setting.rotation, "of length 1".into()));
             }
         }
-        Ok((effects, numbers))
+        Ok(effects)
     }
 
     /// Makes the emitters of a world what they were. `effects`: those that [`Self::check`] has read. Returns the rows of all
     /// effects that have numbers.
-    pub(super) fn restore(&self, world: &mut World, effects: Vec<WeatherEffect>) -> Vec<u16> {
+    pub(super) fn restore(&self, world: &mut World, effects: Effects) -> Vec<u16> {
         let mut added = world.query_filtered::<Entity, With<AddedEmitter>>();
         for emitter in added.iter(world).collect::<Vec<_>>() {
             world.despawn(emitter);
         }
-        let mut handles = own_effects(world);
-        let own = handles.len();
-        for effect in effects {
-            let handle = handle_of(world, &handles[..own], effect);
-            handles.push(handle);
-        }
+        let handles = effects.restore(world);
         let mut scenario = emitters_in_order(world).into_iter();
         for setting in &self.emitters {
             let emitter = if setting.role == Role::Added {
@@ -267,22 +187,6 @@ impl EmitterSettings {
         // There is room: that was checked.
         handles.iter().map(|handle| table.index_of(handle).map_or(0, |row| row.0)).collect()
     }
-}
-
-/// An effect that is none of the scenario's: one that is there already, from an earlier time, or a new one.
-fn handle_of(
-    world: &mut World,
-    own: &[Handle<WeatherEffect>],
-    effect: WeatherEffect,
-) -> Handle<WeatherEffect> {
-    let rows = world.resource::<EffectTable>().rows();
-    let mut others = rows.iter().filter(|row| !own.contains(&row.handle));
-    if let Some(known) = others.find(|row| row.effect.as_ref() == Some(&effect)) {
-        return known.handle.clone();
-    }
-    let handle = world.resource_mut::<Assets<WeatherEffect>>().add(effect.clone());
-    world.resource_mut::<EffectTable>().insert(handle.clone(), effect);
-    handle
 }
 
 impl EmitterSetting {
@@ -347,12 +251,4 @@ impl EmitterSetting {
             }
         }
     }
-}
-
-/// A particle whose effect is a row of a world. `rows`: of all effects that have numbers; without, it is one already.
-pub(super) fn with_row(mut particle: SavedParticle, rows: Option<&[u16]>) -> SavedParticle {
-    if let Some(row) = rows.and_then(|rows| rows.get(usize::from(particle.effect))) {
-        particle.effect = *row;
-    }
-    particle
 }

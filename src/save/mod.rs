@@ -16,6 +16,7 @@
 //!
 //! Not kept: rings of drops, which live for less than a second.
 
+mod effects;
 mod emitters;
 mod error;
 mod leftovers;
@@ -216,7 +217,7 @@ impl SavedScene {
 
     /// Keeps what emitters are set to, too, as it is now: where somebody has put them, whether they are in
     /// [somebody's hand](crate::scenario::ByHand), [removed](RemovedEmitter) or [added](AddedEmitter), and effects that are none of the
-    /// scenario's. A scenario says that itself, and when it changes; this is for apps in which somebody may have changed it. Right
+    /// scenario's or are not as in its files. A scenario says that itself, and when it changes; this is for apps in which somebody may have changed it. Right
     /// after [`Self::capture`].
     ///
     /// # Errors

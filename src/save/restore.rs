@@ -7,7 +7,7 @@ use bevy::prelude::*;
 use bevy::render::storage::ShaderBuffer;
 
 use super::maps::value;
-use super::{AddedEmitter, SaveError, SavedScene, emitters, emitters_in_order, surfaces_in_order};
+use super::{AddedEmitter, SaveError, SavedScene, effects, emitters_in_order, surfaces_in_order};
 use crate::clock::WeatheringClock;
 use crate::effect::EffectTable;
 use crate::emitter::{EmissionSeed, EmitterState, NewParticles};
@@ -89,7 +89,7 @@ impl SavedScene {
             return Err(value(&path, "drying", "out of order", expected));
         };
         let rows = world.resource::<EffectTable>().rows().len();
-        let effects = settings.as_ref().map_or(rows, |(_, (_, numbers))| *numbers);
+        let effects = settings.as_ref().map_or(rows, |(_, effects)| effects.numbers);
         let saved = state.particles.iter().chain(&state.waiting);
         if let Some(effect) =
             saved.map(|particle| usize::from(particle.effect)).find(|&effect| effect >= effects)
@@ -125,7 +125,7 @@ impl SavedScene {
         world.insert_resource(Digest(state.digest));
         world.insert_resource(EmissionSeed(state.seed));
         world.resource_mut::<WeatheringClock>().go_to(state.tick);
-        let rows = settings.map(|(kept, (effects, _))| kept.restore(world, effects));
+        let rows = settings.map(|(kept, effects)| kept.restore(world, effects));
         for (entity, emitter) in emitters_in_order(world).into_iter().zip(&state.emitters) {
             if let Some(mut state) = world.get_mut::<EmitterState>(entity) {
                 *state = emitter.clone();
@@ -133,7 +133,7 @@ impl SavedScene {
         }
         let mut particles = world.resource_mut::<Particles>();
         particles.clear();
-        let in_world = |&saved: &SavedParticle| Particle::from(emitters::with_row(saved, rows.as_deref()));
+        let in_world = |&saved: &SavedParticle| Particle::from(effects::with_row(saved, rows.as_deref()));
         particles.spawn(state.particles.iter().map(in_world));
         let waiting = state.waiting.iter().map(in_world).collect();
         world.resource_mut::<NewParticles>().restore(waiting, state.next_sequence);

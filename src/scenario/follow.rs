@@ -1,13 +1,13 @@
 //! Effects that follow their files, in apps whose asset server watches these.
 //!
 //! Every emitter of a scenario has an effect of its own, read before anything is spawned, so that nothing waits for it and
-//! nobody's edit is another's. What is edited in the file is copied to all emitters that it belongs to.
+//! nobody's edit is another's. What is edited in the file is copied to the own effects of all emitters that it belongs to, also
+//! of those that send out another one just now.
 
 use bevy::prelude::*;
 
-use super::{AssetTree, LoadedScenario};
+use super::{AssetTree, LoadedScenario, OwnEffect};
 use crate::effect::WeatherEffect;
-use crate::emitter::Emitter;
 
 /// The file of an emitter's effect.
 #[derive(Component, Debug, Clone)]
@@ -27,17 +27,19 @@ pub(super) fn follow_effect(world: &mut World, loaded: &LoadedScenario, index: u
 /// Copies effects whose files have been read again to their emitters.
 pub(super) fn follow_effect_files(
     mut events: MessageReader<AssetEvent<WeatherEffect>>,
-    emitters: Query<(&Emitter, &EffectFile)>,
+    mut emitters: Query<(&mut OwnEffect, &EffectFile)>,
     mut effects: ResMut<Assets<WeatherEffect>>,
 ) {
     for event in events.read() {
         let AssetEvent::Modified { id } = *event else { continue };
-        for (emitter, EffectFile(file)) in &emitters {
+        for (mut own, EffectFile(file)) in &mut emitters {
             if file.id() == id
                 && let Some(effect) = effects.get(id).cloned()
-                && let Err(error) = effects.insert(&emitter.effect, effect)
             {
-                warn!("an effect was read again, and cannot be used: {error}");
+                own.read.clone_from(&effect);
+                if let Err(error) = effects.insert(&own.handle, effect) {
+                    warn!("an effect was read again, and cannot be used: {error}");
+                }
             }
         }
     }
@@ -46,6 +48,7 @@ pub(super) fn follow_effect_files(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::emitter::Emitter;
 
     #[test]
     fn emitters_of_a_file_follow_it_and_others_do_not() {
@@ -54,18 +57,23 @@ mod tests {
         app.add_systems(PreUpdate, follow_effect_files);
         let of = |volume_mm3| WeatherEffect { volume_mm3, ..default() };
         let mut effects = app.world_mut().resource_mut::<Assets<WeatherEffect>>();
-        let (file, own, other) = (effects.add(of(1.0)), effects.add(of(1.0)), effects.add(of(2.0)));
+        let [file, own, exchanged, other] = [1.0, 1.0, 1.0, 2.0].map(|volume| effects.add(of(volume)));
         let emitter = |effect: &Handle<WeatherEffect>| Emitter { effect: effect.clone(), ..default() };
-        app.world_mut().spawn((emitter(&own), EffectFile(file.clone())));
-        app.world_mut().spawn(emitter(&other));
+        let own_of = |effect: &Handle<WeatherEffect>| OwnEffect { handle: effect.clone(), read: of(1.0) };
+        app.world_mut().spawn((emitter(&own), own_of(&own), EffectFile(file.clone())));
+        app.world_mut().spawn((emitter(&other), own_of(&exchanged), EffectFile(file.clone())));
+        app.world_mut().spawn((emitter(&other), own_of(&other)));
         let volumes = |app: &mut App| {
             app.update();
             app.update();
             let effects = app.world().resource::<Assets<WeatherEffect>>();
-            [&own, &other].map(|handle| effects.get(handle).map(|effect| effect.volume_mm3))
+            [&own, &exchanged, &other].map(|handle| effects.get(handle).map(|effect| effect.volume_mm3))
         };
-        assert_eq!(volumes(&mut app), [Some(1.0), Some(2.0)]);
+        assert_eq!(volumes(&mut app), [Some(1.0), Some(1.0), Some(2.0)]);
         app.world_mut().resource_mut::<Assets<WeatherEffect>>().insert(&file, of(7.0)).unwrap();
-        assert_eq!(volumes(&mut app), [Some(7.0), Some(2.0)]);
+        // Also where another is sent out, which stays as it is.
+        assert_eq!(volumes(&mut app), [Some(7.0), Some(7.0), Some(2.0)]);
+        let mut owned = app.world_mut().query::<(&OwnEffect, Has<EffectFile>)>();
+        assert!(owned.iter(app.world()).all(|(own, follows)| (own.read.volume_mm3 == 7.0) == follows));
     }
 }

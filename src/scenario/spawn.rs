@@ -23,6 +23,7 @@ use crate::emitter::{EmissionSeed, Emitter};
 use crate::material::{PlayedWetMap, Playing};
 use crate::overlay::{FramesWork, OverlayUv, PrepareStamps, TexelArea, Unmapped, Weatherable};
 use crate::particle::{Forces, ParticleConfig};
+use crate::save::{AddedEmitter, RemovedEmitter};
 use crate::unwrap::{NotUnwrapped, UnwrapMeshes};
 use crate::wetting::{self, ExposureProgress, MeasureProgress, MeasureSurfaces};
 
@@ -71,7 +72,12 @@ pub struct SceneEntity;
 
 /// The effect that an emitter of the scenario has by its file, whatever it sends out now.
 #[derive(Component, Debug, Clone)]
-pub(crate) struct OwnEffect(pub(crate) Handle<WeatherEffect>);
+pub(crate) struct OwnEffect {
+    /// With what somebody has edited of it.
+    pub(crate) handle: Handle<WeatherEffect>,
+    /// As it was read.
+    pub(crate) read: WeatherEffect,
+}
 
 /// The folder that the app's asset server reads from, where it may be another than the scenario's tree: then files of the
 /// scenario are loaded by absolute paths, which the asset server must allow. If it is the same, and the asset server watches it,
@@ -104,6 +110,8 @@ impl Plugin for ScenarioPlugin {
     fn build(&self, app: &mut App) {
         set_up(app.world_mut(), &self.scenario, self.seed);
         app.init_resource::<Digest>()
+            .register_type::<AddedEmitter>()
+            .register_type::<RemovedEmitter>()
             .add_systems(
                 PreUpdate,
                 watch_loading
@@ -231,7 +239,7 @@ pub(crate) fn spawn_emitter(
 ) -> Option<Entity> {
     let spec = scenario.emitters.get(index)?;
     let handle = world.resource_mut::<Assets<WeatherEffect>>().add(effect.clone());
-    world.resource_mut::<EffectTable>().insert(handle.clone(), effect);
+    world.resource_mut::<EffectTable>().insert(handle.clone(), effect.clone());
     let emitter = Emitter {
         effect: handle.clone(),
         rate: spec.rate,
@@ -243,7 +251,7 @@ pub(crate) fn spawn_emitter(
         stream: index as u32,
         enabled: false,
     };
-    let named = (SceneEntity, Name::new(spec.name.clone()), OwnEffect(handle));
+    let named = (SceneEntity, Name::new(spec.name.clone()), OwnEffect { handle, read: effect });
     Some(world.spawn((named, emitter, emitter_motion(scenario, spec))).id())
 }
 

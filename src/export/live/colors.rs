@@ -41,10 +41,11 @@ type Coming = (Entity, [Option<Vec<u8>>; 3]);
 pub struct ColorReadback(Arc<Mutex<Vec<Coming>>>);
 
 impl ColorReadback {
-    /// Whether all that fell on surfaces has been painted; what is still to be would be missing, and what is
-    /// [lost](SplatStats::lost) is. Without a renderer it always has.
+    /// Whether all that fell on surfaces has been painted, and has moved over where maps get another size; what is still to be
+    /// would be missing, and what is [lost](SplatStats::lost) is. Without a renderer it always has.
     pub fn is_painted(world: &mut World) -> bool {
-        let Some(pending) = world.get_resource::<SplatStats>().map(SplatStats::pending) else { return true };
+        let pending = world.get_resource::<SplatStats>().map(|stats| stats.pending() + stats.moving());
+        let Some(pending) = pending else { return true };
         let mut queues = world.query::<&SplatQueue>();
         pending == 0 && queues.iter(world).all(|queue| queue.splats().is_empty())
     }

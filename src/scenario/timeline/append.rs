@@ -14,12 +14,18 @@ use crate::scenario::motion::EmitterMotion;
 /// Lets more events happen in the scenario that runs: of a tick that begins, in order. None of the emitters that they switch or
 /// move may have such an event later. `scenario`: without them.
 ///
-/// `false` if what they change changes later, too: then nothing has been added, and all events have to be
-/// [exchanged](super::exchange_events).
+/// `false` if what they change changes later, too, or something comes behind them in their tick: then nothing has been added, and
+/// all events have to be [exchanged](super::exchange_events).
 pub(crate) fn append_events(world: &mut World, scenario: &Scenario, events: &[EventSpec]) -> bool {
     let hz = scenario.tick_hz;
     let Some(mut timeline) = world.get_resource_mut::<Timeline>() else { return false };
-    let is_last = |EventSpec { at, what }: &EventSpec| timeline.is_last(scenario, what, tick_from(*at, hz));
+    // What is rounded to the same tick may come behind it all the same.
+    let is_before =
+        |at: f64, other: &EventSpec| other.at > at && tick_from(other.at, hz) <= tick_from(at, hz);
+    let is_last = |EventSpec { at, what }: &EventSpec| {
+        timeline.is_last(scenario, what, tick_from(*at, hz))
+            && !scenario.events.iter().any(|other| is_before(*at, other))
+    };
     if !events.iter().all(is_last) {
         return false;
     }
@@ -130,6 +136,14 @@ mod tests {
             assert!(!append_events(&mut world, &scenario, &events(event)), "{event}");
             assert_known(&mut world, &scenario);
         }
+        // Ten nanoseconds late is in time for the tick that begins.
+        let late = self::scenario(
+            r#"[(at: 0.30000001, what: Brush(kind: Dry, point: (0.0, 0.0, 0.0), radius: 0.1, strength: 0.5))]"#,
+        );
+        assert_eq!(tick_from(0.30000001, 10), tick_from(0.3, 10));
+        let mut other = self::world(&late);
+        assert!(!append_events(&mut other, &late, &events(r#"[(at: 0.3, what: Start("rain"))]"#)));
+        assert!(append_events(&mut other, &late, &events(r#"[(at: 0.4, what: Start("rain"))]"#)));
         let mut world = world(&scenario);
         let of_another = r#"[(at: 3.0, what: Material(surface: "b", material: "clay"))]"#;
         assert!(append_events(&mut world, &scenario, &events(of_another)));

@@ -13,12 +13,12 @@ mod apply;
 mod check;
 mod events;
 mod expect;
+mod moves;
 mod steps;
 
 use bevy::prelude::*;
 
-use super::motion::{EmitterMotion, Leg, pose};
-use super::{CameraKey, EmitterKey, EmitterSpec, Scenario};
+use super::{CameraKey, Scenario};
 use steps::Timeline;
 
 pub use events::{
@@ -30,6 +30,7 @@ pub use expect::{ExpectationOutcome, Expectations};
 pub(crate) use append::append_events;
 pub(super) use apply::{MaterialHandles, apply_events_plugin, insert_events};
 pub(crate) use apply::{exchange_events, rewind};
+pub(super) use moves::emitter_motion;
 
 /// How much of a tick a time may be off by rounding.
 const ROUNDING: f64 = 1.0e-6;
@@ -108,38 +109,6 @@ fn named<'a>(
     named.collect()
 }
 
-/// When an emitter works and where it is, with what events say of it.
-pub(super) fn emitter_motion(scenario: &Scenario, spec: &EmitterSpec) -> EmitterMotion {
-    let (keys, stop) = (spec.keys.clone(), spec.stop.unwrap_or(scenario.seconds));
-    let mut motion = EmitterMotion { keys, legs: Vec::new(), start: spec.start, stop, switches: Vec::new() };
-    for (_, event) in in_order(scenario) {
-        motion.add(&spec.name, event, scenario.tick_hz);
-    }
-    motion
-}
-
-impl EmitterMotion {
-    /// Adds an event behind all others, if it is about the emitter of this name.
-    fn add(&mut self, emitter: &str, EventSpec { at, what }: &EventSpec, hz: u32) {
-        match what {
-            Action::Start(name) if name == emitter => self.switches.push((tick_from(*at, hz), true)),
-            Action::Stop(name) if name == emitter => self.switches.push((tick_from(*at, hz), false)),
-            Action::Move(step) if step.emitter == emitter => {
-                let t = *at as f32;
-                // A move that is under way ends here; what was before is not touched.
-                let Some((position, target)) = pose(&self.keys, &self.legs, t) else { return };
-                // What is at once is done by the end of the first tick that begins then, and not before.
-                let arrives = t + step.over.max(0.5 / hz as f32);
-                self.legs.push(Leg {
-                    from: EmitterKey { t, position, target },
-                    to: EmitterKey { t: arrives, position: step.position, target: step.target },
-                });
-            }
-            _ => {}
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::load::ron_options;
@@ -187,45 +156,6 @@ mod tests {
         let list = [1, 3, 3, 3, 7];
         let found = |tick| due(&list, tick, |item| *item).len();
         assert_eq!([0, 1, 2, 3, 7, 8].map(found), [0, 1, 0, 3, 1, 0]);
-    }
-
-    #[test]
-    fn emitters_are_switched_and_moved_in_the_ticks_that_begin_then() {
-        let scenario = scenario(
-            r#"[(at: 1.0, what: Start("rain")), (at: 2.0, what: Stop("rain")),
-                (at: 3.0, what: Move(emitter: "rain", position: (1.0, 2.0, 0.0), target: (0.0, 0.0, 0.0))),
-                (at: 4.0, what: Move(emitter: "rain", position: (3.0, 2.0, 0.0), target: (0.0, 0.0, 0.0), over: 2.0))]"#,
-        );
-        let motion = emitter_motion(&scenario, &scenario.emitters[0]);
-        assert_eq!(motion.switches, [(11, true), (21, false)]);
-        let x_at = |tick: u32| pose(&motion.keys, &motion.legs, tick as f32 / 10.0).unwrap().0.x;
-        for (tick, x) in [(1, 0.0), (30, 0.0), (31, 1.0), (40, 1.0), (50, 2.0), (60, 3.0), (90, 3.0)] {
-            assert!((x_at(tick) - x).abs() < 1e-5, "{tick}: {}", x_at(tick));
-        }
-    }
-
-    #[test]
-    fn a_move_changes_nothing_of_what_was_before_it() {
-        let from = |moves: usize| {
-            let all: Vec<_> = (0..moves)
-                .map(|index| {
-                    let at = 0.7 + 0.3 * index as f32;
-                    format!(
-                        r#"(at: {at:?}, what: Move(emitter: "rain", position: ({at:?}, 2.1, 0.3), target: (0.0, 0.0, 0.0), over: 0.9))"#
-                    )
-                })
-                .collect();
-            let scenario = scenario(&format!("[{}]", all.join(", ")));
-            emitter_motion(&scenario, &scenario.emitters[0])
-        };
-        let (some, more) = (from(5), from(12));
-        let poses = |motion: &EmitterMotion, ticks: std::ops::RangeInclusive<u32>| -> Vec<_> {
-            let at = |tick| pose(&motion.keys, &motion.legs, tick as f32 / 10.0).unwrap();
-            ticks.map(at).collect()
-        };
-        // The sixth begins at 2.2 seconds.
-        assert_eq!(poses(&some, 1..=22), poses(&more, 1..=22));
-        assert_ne!(poses(&some, 23..=23), poses(&more, 23..=23));
     }
 
     #[test]

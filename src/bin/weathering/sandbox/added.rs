@@ -1,25 +1,28 @@
-//! Emitters that the user adds and removes.
+//! Emitters that the user adds, and those that were there only for a time.
 //!
 //! One that is added is the sandbox's own, until a recording begins: then it becomes one of the recorded scenario, and what is added
 //! or removed from then on is recorded. One of the scenario that is removed stays in the world, switched off, since what is saved
 //! has all of them. Of a session whose recording has ended, each is there in its own time ([`Stay`]).
 
+mod removed;
+
 use std::ops::Range;
 
 use bevy::prelude::*;
 use bevy_egui::egui;
-use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::collision::{CollisionScene, SceneHit};
 use bevy_weathering::effect::WeatherEffect;
 use bevy_weathering::emitter::{Emitter, EmitterShape};
 use bevy_weathering::record::{ExtraEmitter, Recording};
-use bevy_weathering::save::{AddedEmitter, RemovedEmitter};
-use bevy_weathering::scenario::{ByHand, EmitterKey, EmitterSpec, SceneEntity};
+use bevy_weathering::save::AddedEmitter;
+use bevy_weathering::scenario::{EmitterKey, EmitterSpec, SceneEntity};
 
 use super::camera::View;
 use super::ui::Note;
 use super::undo::Undo;
 use super::{effects, hose, probe};
+
+pub use removed::{Done, remove};
 
 /// Random streams of what is added begin here: behind those of any scenario.
 const STREAMS: u32 = 1 << 29;
@@ -31,11 +34,9 @@ const AIM: f32 = 4.0;
 #[derive(Component, Debug, Clone, PartialEq, Eq)]
 pub struct Stay(Range<u32>);
 
-impl Stay {
-    /// Whether its time has not come yet.
-    pub fn is_to_come(&self, tick: u32) -> bool {
-        tick < self.0.start
-    }
+/// Whether an emitter is there after a tick. What somebody has taken in hand is theirs, whatever its time is.
+pub fn is_there(stay: Option<&Stay>, is_by_hand: bool, tick: u32) -> bool {
+    is_by_hand || stay.is_none_or(|stay| stay.0.contains(&tick))
 }
 
 /// What is added, and where.
@@ -54,28 +55,8 @@ enum Spot {
     Beside,
 }
 
-/// What was done to an emitter, to be taken back.
-pub enum Done {
-    /// It was added; its stream.
-    Added(u32),
-    /// It had been added, and was removed.
-    Gone(Box<(Name, Emitter, Transform)>),
-    /// It is the scenario's, and was removed.
-    Removed(Removed),
-}
-
-/// An emitter of the scenario before it was removed.
-pub struct Removed {
-    emitter: Entity,
-    was_on: bool,
-    was_by_hand: bool,
-    stay: Option<Stay>,
-}
-
 pub fn plugin(app: &mut App) {
-    app.insert_resource(Choice { effect: "hose".into(), place: Spot::LookedAt })
-        // Before panels show who is there.
-        .add_systems(PreUpdate, follow_stays);
+    app.insert_resource(Choice { effect: "hose".into(), place: Spot::LookedAt });
 }
 
 /// Whether there is an emitter that is no part of the scenario.
@@ -91,26 +72,6 @@ pub fn keep_stays(world: &mut World) {
     let stays: Vec<_> = emitters.iter(world).filter_map(stay).collect();
     for (emitter, stay) in stays.into_iter().filter(|(_, stay)| stay.0 != (0..u32::MAX)) {
         world.entity_mut(emitter).insert(stay);
-    }
-}
-
-/// Emitters whose time is over have been removed, until the scene is started over.
-fn follow_stays(
-    clock: Res<WeatheringClock>,
-    emitters: Query<(Entity, &Stay, Has<RemovedEmitter>, Has<ByHand>)>,
-    mut commands: Commands,
-) {
-    for (emitter, stay, is_removed, is_by_hand) in &emitters {
-        match (clock.tick() >= stay.0.end, is_removed) {
-            (false, true) => {
-                commands.entity(emitter).remove::<(RemovedEmitter, ByHand)>();
-            }
-            // What somebody has taken in hand is theirs.
-            (true, false) if !is_by_hand => {
-                commands.entity(emitter).insert(RemovedEmitter);
-            }
-            _ => {}
-        }
     }
 }
 
@@ -168,7 +129,7 @@ fn add(world: &mut World, choice: &Choice) {
     for (name, other, is_added) in others.iter(world) {
         names.push(name.as_str().to_owned());
         if is_added {
-            stream = stream.max(other.stream + 1);
+            stream = stream.max(other.stream.saturating_add(1));
         }
     }
     let name = numbered(&name, |name| names.iter().any(|other| other == name));
@@ -278,155 +239,17 @@ pub fn to_record(world: &mut World) -> Result<Vec<ExtraEmitter>, String> {
     order.into_iter().map(extra).collect()
 }
 
-/// Takes an emitter away.
-pub fn remove(world: &mut World, emitter: Entity) {
-    if let Some(mut recording) = world.get_resource_mut::<Recording>() {
-        recording.remove_emitter(emitter);
-        if world.resource::<Time<Virtual>>().is_paused() {
-            world.resource_mut::<Note>().tell("it goes when time goes on");
-        }
-        return;
-    }
-    let Ok(mut entity) = world.get_entity_mut(emitter) else { return };
-    let Some(was) = entity.get::<Emitter>().cloned() else { return };
-    let done = if entity.contains::<AddedEmitter>() {
-        let name = entity.get::<Name>().cloned().unwrap_or_default();
-        let transform = entity.get::<Transform>().copied().unwrap_or_default();
-        entity.despawn();
-        Done::Gone(Box::new((name, was, transform)))
-    } else {
-        let (was_on, was_by_hand) = (was.enabled, entity.contains::<ByHand>());
-        // For good, whatever its time was.
-        let stay = entity.take::<Stay>();
-        // Or its working hours would switch it on again.
-        entity.insert((RemovedEmitter, ByHand, Emitter { enabled: false, ..was }));
-        Done::Removed(Removed { emitter, was_on, was_by_hand, stay })
-    };
-    world.resource_mut::<Undo>().keep_emitter(done);
-}
-
-impl Done {
-    /// Takes it back; tells what was done.
-    pub fn take_back(self, world: &mut World) -> &'static str {
-        match self {
-            Self::Added(stream) => {
-                let mut added = world.query_filtered::<(Entity, &Emitter), With<AddedEmitter>>();
-                let found = added.iter(world).find(|(_, emitter)| emitter.stream == stream);
-                if let Some(emitter) = found.map(|(emitter, _)| emitter) {
-                    world.despawn(emitter);
-                }
-                "took the emitter away"
-            }
-            Self::Gone(emitter) => {
-                let (name, emitter, transform) = *emitter;
-                spawn(world, name, emitter, transform);
-                "brought the emitter back"
-            }
-            Self::Removed(Removed { emitter, was_on, was_by_hand, stay }) => {
-                let Ok(mut entity) = world.get_entity_mut(emitter) else { return "the emitter has gone" };
-                if entity.take::<RemovedEmitter>().is_some() {
-                    if let Some(mut emitter) = entity.get_mut::<Emitter>() {
-                        emitter.enabled = was_on;
-                    }
-                    if !was_by_hand {
-                        entity.remove::<ByHand>();
-                    }
-                    if let Some(stay) = stay {
-                        entity.insert(stay);
-                    }
-                }
-                "brought the emitter back"
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::undo::undo;
     use super::*;
 
-    fn world() -> World {
-        let mut world = World::new();
-        world.init_resource::<Undo>();
-        world.init_resource::<Note>();
-        world
-    }
-
-    fn added(world: &mut World) -> Vec<(Entity, u32)> {
-        let mut added = world.query_filtered::<(Entity, &Emitter), With<AddedEmitter>>();
-        added.iter(world).map(|(entity, emitter)| (entity, emitter.stream)).collect()
-    }
-
     #[test]
-    fn what_was_added_and_removed_is_taken_back_in_turn() {
-        let mut world = world();
-        let emitter = Emitter { stream: 7, rate: 3.0, ..default() };
-        spawn(&mut world, Name::new("a"), emitter, Transform::from_xyz(1.0, 2.0, 3.0));
-        world.resource_mut::<Undo>().keep_emitter(Done::Added(7));
-        let [(first, _)] = added(&mut world)[..] else { panic!("one was added") };
-        remove(&mut world, first);
-        assert!(added(&mut world).is_empty() && !is_any(&mut world));
-        undo(&mut world);
-        let [(again, 7)] = added(&mut world)[..] else { panic!("it is not back") };
-        let (emitter, transform) = (world.get::<Emitter>(again), world.get::<Transform>(again));
-        assert_eq!(emitter.map(|emitter| (emitter.rate, emitter.enabled)), Some((3.0, true)));
-        assert_eq!(transform.map(|transform| transform.translation), Some(Vec3::new(1.0, 2.0, 3.0)));
-        // Another entity than it was, and yet the same emitter.
-        undo(&mut world);
-        assert!(added(&mut world).is_empty());
-        undo(&mut world);
-    }
-
-    #[test]
-    fn emitters_of_the_scenario_are_switched_off_and_come_back_as_they_were() {
-        for was_by_hand in [false, true] {
-            let mut world = world();
-            let emitter = world.spawn((SceneEntity, Emitter::default())).id();
-            if was_by_hand {
-                world.entity_mut(emitter).insert(ByHand);
-            }
-            remove(&mut world, emitter);
-            assert!(!world.get::<Emitter>(emitter).unwrap().enabled);
-            assert!(world.get::<ByHand>(emitter).is_some() && world.get::<RemovedEmitter>(emitter).is_some());
-            undo(&mut world);
-            assert!(world.get::<Emitter>(emitter).unwrap().enabled);
-            assert!(world.get::<RemovedEmitter>(emitter).is_none());
-            assert_eq!(world.get::<ByHand>(emitter).is_some(), was_by_hand);
-        }
-    }
-
-    /// Whether the panel has it after a tick.
-    fn is_there_at(world: &mut World, emitter: Entity, tick: u32) -> bool {
-        let mut clock = WeatheringClock::new(60);
-        (0..tick).for_each(|_| clock.advance());
-        world.insert_resource(clock);
-        let mut schedule = Schedule::default();
-        schedule.add_systems(follow_stays);
-        schedule.run(world);
-        world.get::<RemovedEmitter>(emitter).is_none()
-    }
-
-    #[test]
-    fn what_was_removed_in_a_session_stays_so_when_its_recording_has_ended() {
-        let mut world = world();
-        let emitter = world.spawn((SceneEntity, Emitter { enabled: false, ..default() }, Stay(10..50))).id();
-        let there = [60, 49, 9, 50].map(|tick| is_there_at(&mut world, emitter, tick));
-        assert_eq!(there, [false, true, true, false]);
-        let stay = world.get::<Stay>(emitter).unwrap();
-        assert!(stay.is_to_come(9) && !stay.is_to_come(10));
-        // Its events keep it off: nobody has taken it in hand.
-        assert!(world.get::<ByHand>(emitter).is_none());
-        // In its time it may be removed for good, and that be taken back.
-        assert!(is_there_at(&mut world, emitter, 30));
-        remove(&mut world, emitter);
-        assert!(!is_there_at(&mut world, emitter, 31) && !is_there_at(&mut world, emitter, 60));
-        undo(&mut world);
-        assert!(is_there_at(&mut world, emitter, 31) && !is_there_at(&mut world, emitter, 60));
-        // What is in somebody's hand does not go.
-        assert!(is_there_at(&mut world, emitter, 40));
-        world.entity_mut(emitter).insert(ByHand);
-        assert!(is_there_at(&mut world, emitter, 60));
+    fn emitters_of_a_session_are_there_in_their_own_time_or_in_a_hand() {
+        let stay = Stay(10..50);
+        let there = [0, 9, 10, 49, 50].map(|tick| is_there(Some(&stay), false, tick));
+        assert_eq!(there, [false, false, true, true, false]);
+        assert!(is_there(Some(&stay), true, 9) && is_there(Some(&stay), true, 60));
+        assert!(is_there(None, false, 0));
     }
 
     #[test]

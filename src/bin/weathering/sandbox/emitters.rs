@@ -35,14 +35,15 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
         ui.label(format!("{} not sent: others carry what they would", counts.merged));
     }
     added::show(ui, world);
-    let mut query = world.query_filtered::<(Entity, &Emitter, Option<&Name>, Option<&Stay>), Listed>();
+    let mut query =
+        world.query_filtered::<(Entity, &Emitter, Option<&Name>, Option<&Stay>, Has<ByHand>), Listed>();
     let tick = world.resource::<WeatheringClock>().tick();
     let recording = world.get_resource::<Recording>();
     let mut all: Vec<(u32, Entity, String)> = query
         .iter(world)
         .filter(|(entity, ..)| recording.is_none_or(|recording| recording.has_emitter(*entity)))
-        .filter(|(.., stay)| stay.is_none_or(|stay| !stay.is_to_come(tick)))
-        .map(|(entity, emitter, name, _)| {
+        .filter(|(.., stay, is_by_hand)| added::is_there(*stay, *is_by_hand, tick))
+        .map(|(entity, emitter, name, ..)| {
             (emitter.stream, entity, name.map_or_else(|| "emitter".to_owned(), ToString::to_string))
         })
         .collect();

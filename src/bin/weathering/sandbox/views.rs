@@ -7,11 +7,14 @@ use std::sync::Arc;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use bevy_egui::egui;
+use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::collision::{CollisionScene, MeshBvh, MeshTriangles, SurfaceCollider};
 use bevy_weathering::emitter::{Emitter, EmitterShape};
 use bevy_weathering::save::RemovedEmitter;
+use bevy_weathering::scenario::ByHand;
 use bevy_weathering::weather::Weather;
 
+use super::added::{self, Stay};
 use super::probe::Probed;
 use super::selection::Selected;
 use super::settings::{Settings, Tool};
@@ -113,13 +116,17 @@ fn find_seams(triangles: &MeshTriangles) -> Vec<[Vec3; 2]> {
 
 fn draw_emitters(
     settings: Res<Settings>,
-    emitters: Query<(&Emitter, &GlobalTransform), Without<RemovedEmitter>>,
+    clock: Res<WeatheringClock>,
+    emitters: Query<(&Emitter, &GlobalTransform, Option<&Stay>, Has<ByHand>), Without<RemovedEmitter>>,
     mut gizmos: Gizmos,
 ) {
     if !settings.views.emitters {
         return;
     }
-    for (emitter, global) in &emitters {
+    for (emitter, global, stay, is_by_hand) in &emitters {
+        if !added::is_there(stay, is_by_hand, clock.tick()) {
+            continue;
+        }
         let transform = global.compute_transform();
         let color = if emitter.enabled { Color::srgb(0.3, 0.75, 1.0) } else { Color::srgb(0.45, 0.45, 0.5) };
         let (place, turn) = (transform.translation, transform.rotation);

@@ -49,7 +49,7 @@ fn save(world: &mut World) {
 }
 
 /// Why the scene cannot be saved as it is.
-fn obstacle(world: &mut World) -> Option<&'static str> {
+pub(super) fn obstacle(world: &mut World) -> Option<&'static str> {
     if export::is_reading(world) {
         return Some("Wait until the scene is read for the export.");
     }

@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, futures::check_ready};
 use bevy_weathering::clock::ShownTime;
 use bevy_weathering::export::{ColorReadback, SurfaceColors};
-use bevy_weathering::overlay::Overlays;
+use bevy_weathering::overlay::MapSize;
 use bevy_weathering::record;
 use bevy_weathering::save::{ColorMaps, SavedScene};
 use bevy_weathering::scenario::{LoadedScenario, ScenarioSurface, reset_scenario};
@@ -17,7 +17,7 @@ use super::super::leave::Leaving;
 use super::super::open::Opened;
 use super::super::ui::Note;
 use super::super::undo::Undo;
-use super::{Purpose, SETTLE, Saving, Step};
+use super::{Purpose, SETTLE, Saving, Step, panel};
 
 /// What of the sandbox's own is not to be saved, nor in the way of what was.
 fn put_tools_away(world: &mut World) {
@@ -81,6 +81,8 @@ pub(super) fn begin_restoring(world: &mut World, folder: &Path) -> Result<(), St
 }
 
 fn restore(world: &mut World, folder: &Path, scene: &SavedScene) {
+    // One may have been taken in hand since.
+    put_tools_away(world);
     let scenario = world.resource::<Opened>().loaded.clone();
     let restored = scene.restore(world, &scenario, folder);
     // It was about the scene that was there.
@@ -92,14 +94,15 @@ fn restore(world: &mut World, folder: &Path, scene: &SavedScene) {
     }
 }
 
-/// The colour maps of all surfaces that have maps, in the order of the scenario; empty ones where nothing has been painted.
+/// The colour maps of all surfaces, in the order of the scenario; empty ones where nothing has been painted, and of those that have
+/// no maps.
 fn in_order(world: &mut World, SurfaceColors(read): SurfaceColors) -> Vec<ColorMaps> {
-    let mut query = world.query::<(Entity, &ScenarioSurface, &Overlays)>();
+    let mut query = world.query::<(Entity, &ScenarioSurface, Option<&MapSize>)>();
     let mut all: Vec<(u32, ColorMaps)> = query
         .iter(world)
-        .map(|(entity, surface, overlays)| {
+        .map(|(entity, surface, size)| {
             let found = read.iter().find(|(other, _)| *other == entity).map(|(_, colors)| colors.clone());
-            let empty = || vec![0; overlays.size.pow(2) as usize * 4];
+            let empty = || vec![0; size.map_or(0, MapSize::texels).pow(2) as usize * 4];
             let none = || ColorMaps { diffuse: empty(), specular: empty(), normal: empty() };
             (surface.index, found.unwrap_or_else(none))
         })
@@ -163,14 +166,23 @@ fn take(world: &mut World, purpose: Purpose, colors: Vec<ColorMaps>) -> Option<S
             return None;
         }
     };
+    // One may have been taken in hand since; time has stood still.
+    put_tools_away(world);
     let scenario: LoadedScenario = world.resource::<Opened>().loaded.clone();
-    // Sliders have been at them.
-    let scene = SavedScene::capture(world, &scenario, colors).with_materials(world).with_emitters(world);
+    let scene = match panel::obstacle(world) {
+        // Somebody has been quick.
+        Some(why) => Err(why.to_owned()),
+        // Sliders have been at them.
+        None => SavedScene::capture(world, &scenario, colors)
+            .with_materials(world)
+            .with_emitters(world)
+            .map_err(|error| error.to_string()),
+    };
     let scene = match scene {
         Ok(scene) => scene,
-        Err(error) => {
+        Err(why) => {
             world.resource_mut::<Leaving>().0 = false;
-            world.resource_mut::<Note>().complain(error.to_string());
+            world.resource_mut::<Note>().complain(why);
             return None;
         }
     };
