@@ -141,7 +141,7 @@ mod tests {
             r#"[(at: 0.30000001, what: Brush(kind: Dry, point: (0.0, 0.0, 0.0), radius: 0.1, strength: 0.5))]"#,
         );
         assert_eq!(tick_from(0.30000001, 10), tick_from(0.3, 10));
-        let mut other = self::world(&late);
+        let mut other = world(&late);
         assert!(!append_events(&mut other, &late, &events(r#"[(at: 0.3, what: Start("rain"))]"#)));
         assert!(append_events(&mut other, &late, &events(r#"[(at: 0.4, what: Start("rain"))]"#)));
         let mut world = world(&scenario);
