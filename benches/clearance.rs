@@ -1,5 +1,5 @@
-//! What the clearance grid saves: a scene that keeps still knows how far off its surfaces are at least, and a segment
-//! shorter than that is not cast.
+//! What the clearance grid saves: a scene that keeps still knows how far off its surfaces are at least, and a segment that comes to
+//! its end in leaps as long as that is not cast.
 //!
 //! There is no switch for it. A [`CollisionScene`] that has just been put together has none until frames have gone by, and here
 //! none do; so the same surfaces are put together once more. Timed are ticks at 100,000 dry particles a second, and the casts

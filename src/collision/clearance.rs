@@ -108,7 +108,9 @@ impl Clearance {
         let margin = half - 0.5 * self.cell;
         let from = cell_of(a.min(b).min(c) - margin);
         let to = cell_of(a.max(b).max(c) + margin);
-        let normal = (b - a).cross(c - a).normalize_or_zero();
+        // By doubles: that of a long and thin one would lean so much that its plane misses cells at its far end.
+        let [from_a, from_b, from_c] = [a, b, c].map(|corner| corner.as_dvec3());
+        let normal = (from_b - from_a).cross(from_c - from_a).normalize_or_zero().as_vec3();
         let reach = normal.abs().dot(half);
         for z in from.z..=to.z {
             for y in from.y..=to.y {
@@ -193,6 +195,7 @@ mod tests {
     use super::*;
     use crate::collision::{MeshBvh, MeshTriangles};
     use crate::scenes::meshes::ground;
+    use bevy::math::DVec3;
 
     #[test]
     fn what_is_called_clear_hits_nothing_and_much_is_called_clear() {
@@ -222,6 +225,114 @@ mod tests {
             hits += u32::from(hit);
         }
         assert!(clear > 35_000 && hits > 1_000, "{clear} {hits}");
+    }
+
+    /// Coordinates in [-1, 1).
+    struct Random(u64);
+
+    impl Random {
+        fn vector(&mut self) -> Vec3 {
+            Vec3::from_array([0; 3].map(|_| {
+                self.0 =
+                    self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (self.0 >> 40) as f32 / (1u32 << 23) as f32 - 1.0
+            }))
+        }
+    }
+
+    /// Whether a segment hits a triangle, by doubles.
+    fn hits(start: Vec3, end: Vec3, corners: &[Vec3; 3]) -> bool {
+        let [start, end] = [start, end].map(|point| point.as_dvec3());
+        let [a, b, c]: [DVec3; 3] = corners.map(|corner| corner.as_dvec3());
+        let (way, ab, ac) = (end - start, b - a, c - a);
+        let normal = ab.cross(ac);
+        let part = (a - start).dot(normal) / way.dot(normal);
+        let at = start + way * part - a;
+        let to_b = at.cross(ac).dot(normal) / normal.length_squared();
+        let to_c = ab.cross(at).dot(normal) / normal.length_squared();
+        // The NaN of a parallel one fails.
+        (0.0..=1.0).contains(&part) && to_b >= 0.0 && to_c >= 0.0 && to_b + to_c <= 1.0
+    }
+
+    /// Of triangles, within a box that is a little larger, as that of a scene is.
+    fn grid_of(triangles: &[[Vec3; 3]]) -> (Clearance, Vec3, Vec3) {
+        let corners = || triangles.iter().flatten();
+        let low = corners().fold(Vec3::INFINITY, |low, &corner| low.min(corner));
+        let high = corners().fold(Vec3::NEG_INFINITY, |high, &corner| high.max(corner));
+        let pad = 8e-6 * low.abs().max(high.abs()).max_element();
+        let (low, high) = (low - pad, high + pad);
+        (Clearance::new((low, high), triangles.iter().copied()).unwrap(), low, high)
+    }
+
+    #[test]
+    fn nothing_is_hidden_in_small_large_flat_or_far_scenes_along_axes_and_from_borders_and_surfaces() {
+        let mut random = Random(3);
+        let (mut clear, mut hit) = (0, 0);
+        for scale in [1e-3_f32, 1.0, 1e6] {
+            for (away, thick) in [(0.0_f32, 1.0_f32), (10.0, 0.0), (1000.0, 0.01)] {
+                let squash = Vec3::new(1.0, thick, 1.0);
+                let place = |point: Vec3| (point * squash + Vec3::new(away, -away, 0.3 * away)) * scale;
+                let mut triangles =
+                    vec![[Vec3::NEG_X - Vec3::Z, Vec3::X - Vec3::Z, Vec3::X + Vec3::Z].map(place)];
+                for _ in 0..8 {
+                    let middle = random.vector();
+                    triangles.push([0; 3].map(|_| place(middle + random.vector() * 0.5)));
+                }
+                let (grid, low, high) = grid_of(&triangles);
+                for round in 0..2000 {
+                    let anywhere = low + (high - low) * (random.vector() * 0.5 + 0.5);
+                    let reach = [0.01_f32, 0.1, 1.0, 10.0][round % 4] * (high - low).max_element();
+                    let (way, axis) = (random.vector() * reach, Vec3::AXES[round / 4 % 3]);
+                    let (start, way) = match round / 12 % 6 {
+                        0 => (anywhere, way),
+                        // Along an axis, straight across it, and hardly along it.
+                        1 => (anywhere, way * axis),
+                        2 => (anywhere, way * (Vec3::ONE - axis)),
+                        3 => (anywhere, way * (Vec3::ONE - axis * 0.99999)),
+                        // From the border of a cell.
+                        4 => {
+                            let border = grid.low + ((anywhere - grid.low) / grid.cell).round() * grid.cell;
+                            (anywhere * (Vec3::ONE - axis) + border * axis, way)
+                        }
+                        // From a surface.
+                        _ => {
+                            let [a, b, c] = triangles[round % triangles.len()];
+                            ((a + b + c) / 3.0, way)
+                        }
+                    };
+                    let end = start + way;
+                    let is_clear = grid.is_clear(start.into(), end.into());
+                    let is_hit = triangles.iter().any(|corners| hits(start, end, corners));
+                    assert!(!(is_hit && is_clear), "{start} {end}, {scale} {away} {thick}");
+                    clear += u32::from(is_clear);
+                    hit += u32::from(is_hit);
+                }
+            }
+        }
+        assert!(clear > 4000 && hit > 2000, "{clear} {hit}");
+    }
+
+    #[test]
+    fn a_wire_as_long_as_the_scene_is_not_called_clear() {
+        let mut random = Random(5);
+        for _ in 0..20 {
+            let (from, along) = (random.vector() * 5.0, random.vector().normalize_or(Vec3::X));
+            let beside = from + along * (8.0 + random.vector().x) + random.vector() * 1e-4;
+            let wire = [from, from + along * 10.0, beside];
+            let corner = [Vec3::ZERO, Vec3::Y, Vec3::Z].map(|point| point - 5.0);
+            let (grid, ..) = grid_of(&[wire, corner]);
+            for _ in 0..4000 {
+                // Points of the triangle.
+                let weights = random.vector().abs();
+                let weights = weights / weights.element_sum();
+                let at = wire[0] * weights.x + wire[1] * weights.y + wire[2] * weights.z;
+                let way = random.vector() * 0.06;
+                let (start, end) = (at - way, at + way);
+                if hits(start, end, &wire) {
+                    assert!(!grid.is_clear(start.into(), end.into()), "{start} {end}");
+                }
+            }
+        }
     }
 
     #[test]

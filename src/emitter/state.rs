@@ -26,10 +26,13 @@ pub struct EmitterState {
 }
 
 impl EmitterState {
-    /// Whether it owes less than a particle, and less than a nanolitre, at this tick rate: as after every tick.
+    /// Whether it owes less than a particle, and less than a nanolitre, at this tick rate, and holds water that there can be: as
+    /// after every tick.
     pub(crate) fn is_sound(&self, hz: u32) -> bool {
         // What is left may be rounded to just below 0. Written so that NaN fails.
-        (-1.0..=f64::from(hz)).contains(&self.owed) && (0.0..=1.0).contains(&self.owed_nl)
+        (-1.0..=f64::from(hz)).contains(&self.owed)
+            && (0.0..=1.0).contains(&self.owed_nl)
+            && (0.0..f64::INFINITY).contains(&self.held_nl)
     }
 
     /// Adds one tick's worth of `rate` and takes out the whole particles. Also returns when within the tick the
@@ -75,5 +78,21 @@ impl EmitterState {
         let whole = self.owed_nl.floor();
         self.owed_nl -= whole;
         whole as u32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_emitter_owes_or_holds_is_not_sound() {
+        assert!(EmitterState::default().is_sound(60));
+        assert!(EmitterState { owed: 59.0, owed_nl: 0.5, held_nl: 1.0e12, ..default() }.is_sound(60));
+        for bad in [-2.0, f64::NAN, f64::INFINITY] {
+            assert!(!EmitterState { owed: bad, ..default() }.is_sound(60), "{bad}");
+            assert!(!EmitterState { owed_nl: bad, ..default() }.is_sound(60), "{bad}");
+            assert!(!EmitterState { held_nl: bad, ..default() }.is_sound(60), "{bad}");
+        }
     }
 }

@@ -120,6 +120,8 @@ mod tests {
         let hits = emitter.rate * 1800.0 * std::f32::consts::PI * effect.stamp_radius.unwrap().powi(2)
             / 1000.5f32.powi(2);
         assert!((hits - HITS).abs() < 0.1, "{hits}");
+        // However slowly it comes.
+        assert_eq!(effect.stamp_speed, Some(0.0));
         let rain = emitter.particle_mm3(effect) * emitter.rate / 1000.5f32.powi(2);
         assert!((rain - 1.0e7 / 3600.0).abs() < 3.0, "{rain}");
     }

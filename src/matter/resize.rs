@@ -11,6 +11,10 @@ impl SurfaceMatter {
         if self.is_empty() {
             return self.clone();
         }
+        if self.size != shares.from {
+            // Of maps that were gone before.
+            return Self::default();
+        }
         let size = shares.size();
         let mut matter = Self::default();
         matter.wake(size);
@@ -117,5 +121,13 @@ mod tests {
         assert_eq!(after.texels[0], TexelMatter { dust: 35, mud: u32::MAX, snow: u32::MAX });
         assert_balanced(&after);
         assert!(SurfaceMatter::default().resized(&Shares::new(32, &geometry)).is_empty());
+    }
+
+    #[test]
+    fn what_lay_on_maps_that_were_gone_before_is_not_there_again() {
+        let geometry = plane(16);
+        for stale in [16, 64] {
+            assert!(dirty(stale).resized(&Shares::new(32, &geometry)).is_empty(), "{stale}");
+        }
     }
 }

@@ -17,7 +17,7 @@ use crate::stamps::StampTexel;
 use crate::stamps::sample::{StampCorners, mix4, on_stamp, stamp_corners};
 
 /// Half the width of the smallest patch that a stamp is seen on, 1/256 texel: two texels.
-pub(super) const LEAST_STAMPED: i32 = 2 * SUBTEXELS;
+const LEAST_STAMPED: i32 = 2 * SUBTEXELS;
 
 /// Buffers that keep their memory from impact to impact.
 #[derive(Debug, Default)]

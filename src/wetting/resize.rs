@@ -15,7 +15,7 @@ use crate::overlay::TILE_SIZE;
 /// Who gets what lay on a texel of a map of another size.
 pub(crate) struct Shares<'a> {
     /// Texels along each side of the old map.
-    from: u32,
+    pub(crate) from: u32,
     /// The surface on the new map.
     to: &'a TexelGeometry,
 }

@@ -200,8 +200,9 @@ impl WideBvh {
                 }
                 count -= 1;
                 let next = waiting[count % ROOM];
-                // Not only before the end: what is hit in the same place has to be seen, whichever tree it is in.
-                if f32::from_bits((next >> 32) as u32) <= *end {
+                // Not only before the end: what is hit in the same place has to be seen, whichever tree it is in. With the same
+                // room for roundings as where it was entered.
+                if f32::from_bits((next >> 32) as u32) <= *end * ROUNDING {
                     current = next as u32;
                     break;
                 }

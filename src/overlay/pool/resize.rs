@@ -75,6 +75,9 @@ pub(super) fn resize_queues(
     }
     for deposit in deposits.into_iter().flat_map(|deposits| &mut deposits.0) {
         (deposit.center, deposit.radius) = resized_stamp(deposit.center, deposit.radius, from, to);
+        if let Some(stamp) = &mut deposit.stamp {
+            (_, stamp.radius) = resized_stamp(deposit.center, stamp.radius, from, to);
+        }
     }
 }
 
@@ -250,5 +253,27 @@ pub(crate) fn put_first_size(world: &mut World, surface: Entity) {
     if size.texels != size.granted {
         put_size(world, surface, size.granted);
         world.entity_mut(surface).remove::<Exposure>();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::matter::{Deposit, DepositStamp, MatterKind};
+
+    #[test]
+    fn matter_that_waits_and_its_stamp_are_as_large_on_other_maps() {
+        let rows = [[1024, 0], [0, 1024]];
+        let waits = Deposit {
+            center: [4096, 8192],
+            radius: [1536, 1024],
+            kind: MatterKind::Dust,
+            volume_nl: 7,
+            stamp: Some(DepositStamp { number: 3, radius: [2048, 1536], rows }),
+        };
+        let mut queue = MatterQueue(vec![waits]);
+        resize_queues(64, 32, &mut SplatQueue::default(), None, Some(&mut queue));
+        let stamp = Some(DepositStamp { number: 3, radius: [1024, 768], rows });
+        assert_eq!(queue.0, [Deposit { center: [2048, 4096], radius: [768, 512], stamp, ..waits }]);
     }
 }
