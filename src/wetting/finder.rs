@@ -119,6 +119,41 @@ impl<'a> Finder<'a> {
         }
     }
 
+    /// The owned texel nearest in space to a place on a triangle that owns no texel there: of those around a texel in the image, and
+    /// of those to which ways lead from the place, over seams, too. If none is near, one of the triangle's own.
+    pub(super) fn nearest_to(&self, place: &Place, around: u32) -> Option<u32> {
+        let point = self.surface.in_space(place);
+        let distance = |texel: u32| {
+            let other = self.place(texel).map(|other| self.surface.in_space(&other));
+            other.map_or(f64::INFINITY, |other| other.distance_squared(point))
+        };
+        let lengths = || (1..=LONGEST_STEP).map(f64::from);
+        let steps = Side::ALL.into_iter().flat_map(|side| {
+            let [columns, rows] = side.offset().map(f64::from);
+            lengths().map(move |length| DVec2::new(columns, rows) * length)
+        });
+        let at_ends = steps.filter_map(|step| match self.end(NOBODY, *place, step)? {
+            End::Texel(other) | End::Elsewhere(Some(other)) => Some(other),
+            End::Itself | End::MeshEnds | End::Elsewhere(None) => None,
+        });
+        let is_meant = |&other: &u32| {
+            self.owners.of(other) == Some(place.triangle) || self.is_near(place, other, SEARCH_REACHES)
+        };
+        let near = self.nearest(place, around, None).into_iter().chain(at_ends).filter(is_meant);
+        near.min_by(|&one, &other| distance(one).total_cmp(&distance(other)))
+            .or_else(|| self.own_texel(place))
+    }
+
+    /// The first texel of a place's own triangle on the way from there to the triangle's middle.
+    fn own_texel(&self, place: &Place) -> Option<u32> {
+        let middle = Place { triangle: place.triangle, weights: [1.0 / 3.0; 3] };
+        let [from, to] = [place, &middle].map(|place| self.surface.on_map(place));
+        let steps = (from.distance(to) / SAMPLES_APART).ceil().max(1.0);
+        (0..=steps as u32)
+            .map(|step| self.grid.at(from.lerp(to, f64::from(step) / steps)))
+            .find(|&texel| self.owners.of(texel) == Some(place.triangle))
+    }
+
     /// Whether a texel lies straight ahead of another in space, by as much as in the image.
     fn lies_ahead(&self, from: u32, [columns, rows]: [i32; 2], there: u32) -> bool {
         let (Some(start), Some(place)) = (self.place(from), self.place(there)) else { return false };

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bevy::math::{Affine3A, Vec2, Vec3};
 
 use super::Units;
-use super::gutters::Gutters;
+use super::gutters::{Gutters, Tip};
 use super::islands::Islands;
 use super::links::Links;
 use super::ownership::NOBODY;
@@ -121,7 +121,8 @@ impl TexelGeometry {
 
     /// The texel that stands for the surface at this one: itself if a triangle owns it; else, up to 8 texels
     /// off an island (columns plus rows), the one that a way over the mesh straight across the island's
-    /// border leads to. Where the mesh ends at that border, the texel of the border. None further out.
+    /// border leads to. Where the mesh ends at that border, the texel of the border. None further out, but for texels
+    /// that bilinear filtering of a triangle reads: those have the nearest one on the mesh.
     pub fn stand_in(&self, texel: u32) -> Option<u32> {
         match self.layout.owner[texel as usize] {
             NOBODY => None,
@@ -166,9 +167,15 @@ impl TexelGeometry {
     }
 
     /// For a texel that nobody owns but that lies within 2 columns and 2 rows of one that somebody does: the
-    /// nearest such texel in the image. None for all others.
+    /// nearest such texel in the image. For one that bilinear filtering reads from a triangle whose island has none so near: the nearest
+    /// on the mesh. None for all others.
     pub fn gutter_source(&self, texel: u32) -> Option<u32> {
         self.layout.gutters.source(texel)
+    }
+
+    /// Texels beside islands so thin that they own none near them.
+    pub(crate) fn tips(&self) -> &[Tip] {
+        self.layout.gutters.tips()
     }
 
     /// Adds the tiles that show anything of these, beyond their own texels.

@@ -49,17 +49,15 @@ pub(super) struct Islands {
 }
 
 impl Islands {
-    /// Finds all islands and their strays. `stand_ins`: of texels that nobody owns.
-    pub(super) fn new(finder: &Finder, stand_ins: &[StandIn]) -> Self {
+    /// Finds the strays of all islands. `of_triangle`, `count`: by [`number_triangles`]; `stand_ins`: of texels that nobody owns.
+    pub(super) fn new(finder: &Finder, of_triangle: Vec<u32>, count: u32, stand_ins: &[StandIn]) -> Self {
         let grid = finder.grid;
-        let (of_triangle, count) = number_triangles(finder);
         let mut whose: Vec<u32> = finder.owners.triangle.clone();
         for island in whose.iter_mut().filter(|owner| **owner != NOBODY) {
             *island = of_triangle[*island as usize];
         }
-        // Texels that are owned have no stand-in, so the island behind it is there already.
         for stand_in in stand_ins {
-            whose[stand_in.texel as usize] = whose[stand_in.from as usize];
+            whose[stand_in.texel as usize] = of_triangle[stand_in.triangle as usize];
         }
         let tiles = islands_of_tiles(&whose, grid.size);
         let is_alone = tiles.iter().all(|&island| island != SHARED && island == tiles[0]);
@@ -199,7 +197,7 @@ fn islands_of_tiles(whose: &[u32], size: u32) -> Vec<u32> {
 }
 
 /// The island of each triangle, and how many islands there are.
-fn number_triangles(finder: &Finder) -> (Vec<u32>, u32) {
+pub(super) fn number_triangles(finder: &Finder) -> (Vec<u32>, u32) {
     let triangles = finder.surface.map.len() as u32;
     let mut groups = Groups((0..triangles).collect());
     for triangle in 0..triangles {

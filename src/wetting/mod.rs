@@ -59,6 +59,7 @@ mod texel;
 mod tick;
 mod tiles;
 mod timing;
+mod touched;
 mod walk;
 
 use bevy::prelude::*;
