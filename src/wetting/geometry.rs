@@ -7,6 +7,7 @@ use bevy::math::{Affine3A, Vec2, Vec3};
 use super::Units;
 use super::gutters::{Gutters, Tip};
 use super::islands::Islands;
+use super::landings::Landing;
 use super::links::Links;
 use super::ownership::NOBODY;
 use super::slopes::Slopes;
@@ -164,6 +165,35 @@ impl TexelGeometry {
         }
         let is_of_island = |other: u32| self.owner(other).is_some_and(|owner| islands.of(owner) == island);
         islands.stray(island, texel).or_else(|| islands.towards(home, texel, is_of_island)).unwrap_or(home)
+    }
+
+    /// Who gets what falls over a texel from a stamp that is kept to an island, or lies on one alone (`None`): as
+    /// [`Self::on_island`] or [`Self::stand_in`] has it, but over seams shared out among the texels under its image there. None where
+    /// nothing stands for the surface.
+    #[inline]
+    pub(crate) fn landing(&self, island: Option<u32>, over: u32, home: u32) -> Option<Landing<'_>> {
+        let layout = &*self.layout;
+        let number = layout.owner[over as usize];
+        if number < STAND_IN && island.is_none_or(|island| layout.islands.of(number) == island) {
+            return Some(Landing::One(over));
+        }
+        self.landing_beside(island, over, home)
+    }
+
+    /// The same for a texel that is not of the island.
+    fn landing_beside(&self, island: Option<u32>, over: u32, home: u32) -> Option<Landing<'_>> {
+        let layout = &*self.layout;
+        let next_to = match layout.owner[over as usize] {
+            number if (STAND_IN..NOBODY).contains(&number) => {
+                Some(layout.stand_ins[(number - STAND_IN) as usize][1])
+            }
+            _ => None,
+        };
+        let shared = island.or(next_to).and_then(|island| layout.islands.shared(island, over));
+        shared.or_else(|| match island {
+            Some(island) => Some(Landing::One(self.on_island(island, over, home))),
+            None => self.stand_in(over).map(Landing::One),
+        })
     }
 
     /// For a texel that nobody owns but that lies within 2 columns and 2 rows of one that somebody does: the

@@ -33,6 +33,7 @@ pub mod gpu;
 mod grid;
 mod gutters;
 mod islands;
+mod landings;
 mod links;
 pub mod look;
 mod marks;
