@@ -67,12 +67,10 @@ pub(crate) fn deposit(
     let island = now.geometry.island_to_keep_to(under, patch.span(0), patch.span(1));
     let mut beside = 0;
     share_out(deposit, stamps, (size, wrap), &mut scratch.shares, |over, nl| {
-        let texel = match island {
-            None => now.geometry.stand_in(over),
-            Some(island) => Some(now.geometry.on_island(island, over, home)),
-        };
-        match texel {
-            Some(texel) => put(water, matter, now, weather, deposit.kind, texel, nl),
+        match now.geometry.landing(island, over, home) {
+            Some(landing) => landing.share(u64::from(nl), |texel, nl| {
+                put(water, matter, now, weather, deposit.kind, texel, nl as u32);
+            }),
             None => beside += nl,
         }
     });

@@ -87,7 +87,7 @@ impl SurfaceFrames {
 
 /// What [`SurfaceFrames`] holds.
 pub(crate) struct Frames {
-    /// Row by row, with a gutter of two texels.
+    /// Row by row, with a gutter of two texels, or of all that bilinear filtering reads.
     pub(crate) texels: Vec<TexelFrame>,
     low: Vec3,
     /// Length of a step, in units of the mesh.
@@ -128,6 +128,18 @@ impl Frames {
             let (columns, rows) = (offset(source % size, texel % size), offset(source / size, texel / size));
             let away = (per_u * columns as f32 + per_v * rows as f32) / size as f32;
             texels[texel as usize] = frame(point.position + away, point.normal, [per_u, per_v]);
+        }
+        for tip in geometry.tips() {
+            let Ok(source) = points.binary_search_by_key(&tip.source, |point| point.texel) else { continue };
+            let (source, [a, b, c]) = (points[source], triangles.positions[tip.triangle as usize]);
+            let along = slopes[tip.triangle as usize];
+            let away = (along[0] * tip.away.x + along[1] * tip.away.y) / size as f32;
+            // A sliver may be stretched on the map, and would lead far away.
+            let [per_u, per_v] = slopes[source.triangle as usize];
+            let away = away.clamp_length_max((per_u.length() + per_v.length()) / size as f32);
+            let place = a + (b - a) * tip.weights[0] + (c - a) * tip.weights[1] + away;
+            let normal = (b - a).cross(c - a).try_normalize().unwrap_or(source.normal);
+            texels[tip.texel as usize] = frame(place, normal, along);
         }
         let (tiles, boxes) = tile_boxes(&texels, size);
         Self { texels, low, step, boxes: BoxOverlaps::build(&boxes), tiles }

@@ -57,7 +57,7 @@ impl Parcel {
 
 /// One grid. Only tiles of it that got water have memory.
 #[derive(Debug, Default)]
-struct Grid {
+pub(crate) struct Grid {
     /// Tiles along each side.
     across: u32,
     /// For each tile, where its cells begin, in tiles and from 1; 0 for none.
@@ -77,7 +77,8 @@ impl Grid {
         }
     }
 
-    fn add(&mut self, [x, y]: [u32; 2], parcel: Parcel) {
+    /// Adds water to a cell.
+    pub(crate) fn add(&mut self, [x, y]: [u32; 2], parcel: Parcel) {
         let tile = y / TILE_SIZE * self.across + x / TILE_SIZE;
         let slot = &mut self.slots[tile as usize];
         if *slot == 0 {
@@ -137,17 +138,17 @@ impl Arrivals {
         }
     }
 
-    /// Adds water to a cell of a grid.
-    pub(crate) fn add(&mut self, level: u32, cell: [u32; 2], parcel: Parcel) {
-        self.grids[level as usize].add(cell, parcel);
+    /// One of the grids; the first is that of texels.
+    pub(crate) fn grid(&mut self, level: u32) -> &mut Grid {
+        &mut self.grids[level as usize]
     }
 
-    /// Shares everything out among texels. `to_texel`: where water that comes over a texel goes.
+    /// Shares everything out among texels. `lay`: puts water that comes over a texel where it goes.
     pub(crate) fn share_out(
         &mut self,
         size: u32,
         wrap: [Wrap; 2],
-        to_texel: impl Fn([u32; 2], Parcel) -> [u32; 2],
+        lay: impl Fn(&mut Grid, [u32; 2], Parcel),
     ) {
         for level in (1..=COARSEST).rev() {
             let (finer, coarser) = self.grids.split_at_mut(level as usize);
@@ -158,8 +159,10 @@ impl Arrivals {
                 let rows = halves_at(row, halves, wrap[1]);
                 for (y, in_row) in rows.into_iter().zip(parcel.halves()) {
                     for (x, part) in columns.into_iter().zip(in_row.halves()) {
-                        if part.nl > 0 {
-                            fine.add(if level == 1 { to_texel([x, y], part) } else { [x, y] }, part);
+                        match part.nl {
+                            0 => {}
+                            _ if level == 1 => lay(fine, [x, y], part),
+                            _ => fine.add([x, y], part),
                         }
                     }
                 }
@@ -194,8 +197,8 @@ mod tests {
         arrivals.begin(SIZE);
         let across = SIZE >> level;
         let parcel = Parcel { nl, home: 3, speed_cm: 7, is_jet: true };
-        arrivals.add(level, [cell % across, cell / across], parcel);
-        arrivals.share_out(SIZE, wrap, |texel, _| texel);
+        arrivals.grid(level).add([cell % across, cell / across], parcel);
+        arrivals.share_out(SIZE, wrap, |texels, texel, parcel| texels.add(texel, parcel));
         let mut texels = vec![0; (SIZE * SIZE) as usize];
         arrivals.drain(|[x, y], parcel| {
             assert_eq!((parcel.speed_cm, parcel.is_jet, parcel.home), (7, true, 3));

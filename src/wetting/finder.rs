@@ -19,6 +19,9 @@ const SAMPLES_APART: f64 = 0.5;
 /// Samples on one triangle behind a seam, at most.
 const MAX_SAMPLES: u32 = 64;
 
+/// The shortest part of a way that tells a direction, in texels.
+const SHORTEST_WAY: f64 = 1e-4;
+
 /// How far a texel is sought in place of one that no triangle owns, in texels along each axis.
 const SEARCH_TEXELS: i32 = 2;
 
@@ -43,6 +46,25 @@ pub(super) struct Finder<'a> {
     /// For each triangle, how long a texel is along u and along v together, metres; 0 if that cannot be told.
     /// From the middle of a texel to any point of it is no further than half of that.
     reach: Vec<f64>,
+    /// For each triangle the area of a texel, m²; 0 or not a number if that cannot be told.
+    texel_area: Vec<f64>,
+}
+
+/// Where a way over the surface ends, and which texel stands for that.
+pub(super) struct Across {
+    last: Leg,
+    pub(super) other: u32,
+}
+
+/// Where a texel comes to lie behind a seam.
+pub(super) struct Image {
+    /// The texel that its middle comes to, or stands for that.
+    pub(super) other: u32,
+    /// Where its middle comes to, on the surface and on the map, in texels of any tile.
+    pub(super) place: Place,
+    pub(super) middle: DVec2,
+    /// Half the width of the box around it, in texels.
+    pub(super) half: f64,
 }
 
 /// Where a way ends.
@@ -57,12 +79,19 @@ enum End {
 
 impl<'a> Finder<'a> {
     pub(super) fn new(grid: Grid, surface: &'a Surface, owners: &'a Ownership) -> Self {
-        let reach = |triangle: u32| {
-            let length = |step| surface.step_in_space(triangle, step).map_or(0.0, |step| step.length());
-            let reach = length(DVec2::X) + length(DVec2::Y);
-            if reach.is_finite() { reach } else { 0.0 }
+        let measure = |triangle: u32| {
+            let [along_u, along_v] =
+                [DVec2::X, DVec2::Y].map(|step| surface.step_in_space(triangle, step).unwrap_or_default());
+            let reach = along_u.length() + along_v.length();
+            (if reach.is_finite() { reach } else { 0.0 }, along_u.cross(along_v).length())
         };
-        Self { grid, surface, owners, reach: (0..surface.map.len() as u32).map(reach).collect() }
+        let (reach, texel_area) = (0..surface.map.len() as u32).map(measure).unzip();
+        Self { grid, surface, owners, reach, texel_area }
+    }
+
+    /// The area of a texel on a triangle, m²; 0 or not a number if that cannot be told.
+    pub(super) fn texel_area(&self, triangle: u32) -> f64 {
+        self.texel_area[triangle as usize]
     }
 
     /// Where an owned texel lies on its triangle.
@@ -97,26 +126,94 @@ impl<'a> Finder<'a> {
         spare.or(beside.filter(|_| !moved)).map_or(Link::Edge, Link::Texel)
     }
 
-    /// The texel that stands for the surface so many columns and rows away from an owned texel; the texel
-    /// itself where the mesh ends before.
-    pub(super) fn stand_in(&self, texel: u32, [columns, rows]: [i32; 2]) -> u32 {
-        let walk = self
-            .place(texel)
-            .and_then(|start| self.surface.walk(start, DVec2::new(f64::from(columns), f64::from(rows))));
-        let Some(last) = walk.and_then(Iterator::last).filter(|last| !last.mesh_ends) else { return texel };
+    /// The way from an owned texel so many columns and rows on; None if the mesh ends before, or no texel is found there.
+    pub(super) fn across(&self, texel: u32, [columns, rows]: [i32; 2]) -> Option<Across> {
+        let step = DVec2::new(f64::from(columns), f64::from(rows));
+        let last = self.surface.walk(self.place(texel)?, step)?.last().filter(|last| !last.mesh_ends)?;
         match self.at_end(&last, NOBODY, None) {
-            End::Texel(other) | End::Elsewhere(Some(other)) => other,
-            End::Itself | End::MeshEnds | End::Elsewhere(None) => texel,
+            End::Texel(other) | End::Elsewhere(Some(other)) => Some(Across { last, other }),
+            End::Itself | End::MeshEnds | End::Elsewhere(None) => None,
         }
     }
 
+    /// The texel that stands for the surface so many columns and rows away from an owned texel; the texel
+    /// itself where the mesh ends before.
+    pub(super) fn stand_in(&self, texel: u32, offset: [i32; 2]) -> u32 {
+        self.across(texel, offset).map_or(texel, |across| across.other)
+    }
+
     /// The same from the border of an island to a texel that is not the island's: that one itself if no way leads there, and it
-    /// lies in space where the way would have ended. Planks beside each other are one wall to what falls on them.
-    pub(super) fn stray(&self, from: u32, offset: [i32; 2], there: u32) -> u32 {
-        match self.stand_in(from, offset) {
+    /// lies in space where the way would have ended. Planks beside each other are one wall to what falls on them. `across`: the way.
+    pub(super) fn stray(&self, from: u32, offset: [i32; 2], there: u32, across: Option<&Across>) -> u32 {
+        match across.map_or(from, |across| across.other) {
             other if other == from && self.lies_ahead(from, offset, there) => there,
             other => other,
         }
+    }
+
+    /// Where the texel comes to lie that lies so many columns and rows beside an owned one, at the end of the way `across`. None
+    /// if that leads over no seam.
+    pub(super) fn image(&self, from: u32, [columns, rows]: [i32; 2], across: &Across) -> Option<Image> {
+        let &Across { last, other } = across;
+        let (before, behind) = (self.owners.of(from)?, last.to.triangle);
+        let middle = self.surface.on_map(&last.to);
+        let way = middle - self.surface.on_map(&last.from);
+        // A mirror turns each step another way, but the one along u and its mirrored ones.
+        let mirror = if self.winding(before) == self.winding(behind) { 1.0 } else { -1.0 };
+        let step = DVec2::new(f64::from(columns), f64::from(rows) * mirror);
+        // The sine and the cosine of the angle by which the texel is turned: together the width of the box around it.
+        let turned = (way.dot(step).abs() + way.perp_dot(step).abs()) / (way.length() * step.length());
+        let turned = if way.length() > SHORTEST_WAY { turned } else { 1.0 };
+        let scale = (self.texel_area(before) / self.texel_area(behind)).sqrt();
+        let half = scale * turned / 2.0;
+        let is_found = last.over_seam && half.is_finite() && half > 0.0;
+        is_found.then_some(Image { other, place: last.to, middle, half })
+    }
+
+    /// Whether a triangle is wound counter-clockwise on the map.
+    fn winding(&self, triangle: u32) -> bool {
+        let [a, b, c] = self.surface.map[triangle as usize];
+        (b - a).perp_dot(c - a) > 0.0
+    }
+
+    /// Whether an owned texel is of the surroundings of a place in space.
+    pub(super) fn is_around(&self, place: &Place, texel: u32) -> bool {
+        self.is_near(place, texel, SEARCH_REACHES)
+    }
+
+    /// The owned texel nearest in space to a place on a triangle that owns no texel there: of those around a texel in the image, and
+    /// of those to which ways lead from the place, over seams, too. If none is near, one of the triangle's own.
+    pub(super) fn nearest_to(&self, place: &Place, around: u32) -> Option<u32> {
+        let point = self.surface.in_space(place);
+        let distance = |texel: u32| {
+            let other = self.place(texel).map(|other| self.surface.in_space(&other));
+            other.map_or(f64::INFINITY, |other| other.distance_squared(point))
+        };
+        let lengths = || (1..=LONGEST_STEP).map(f64::from);
+        let steps = Side::ALL.into_iter().flat_map(|side| {
+            let [columns, rows] = side.offset().map(f64::from);
+            lengths().map(move |length| DVec2::new(columns, rows) * length)
+        });
+        let at_ends = steps.filter_map(|step| match self.end(NOBODY, *place, step)? {
+            End::Texel(other) | End::Elsewhere(Some(other)) => Some(other),
+            End::Itself | End::MeshEnds | End::Elsewhere(None) => None,
+        });
+        let is_meant = |&other: &u32| {
+            self.owners.of(other) == Some(place.triangle) || self.is_near(place, other, SEARCH_REACHES)
+        };
+        let near = self.nearest(place, around, None).into_iter().chain(at_ends).filter(is_meant);
+        near.min_by(|&one, &other| distance(one).total_cmp(&distance(other)))
+            .or_else(|| self.own_texel(place))
+    }
+
+    /// The first texel of a place's own triangle on the way from there to the triangle's middle.
+    fn own_texel(&self, place: &Place) -> Option<u32> {
+        let middle = Place { triangle: place.triangle, weights: [1.0 / 3.0; 3] };
+        let [from, to] = [place, &middle].map(|place| self.surface.on_map(place));
+        let steps = (from.distance(to) / SAMPLES_APART).ceil().max(1.0);
+        (0..=steps as u32)
+            .map(|step| self.grid.at(from.lerp(to, f64::from(step) / steps)))
+            .find(|&texel| self.owners.of(texel) == Some(place.triangle))
     }
 
     /// Whether a texel lies straight ahead of another in space, by as much as in the image.

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use bevy::math::{Affine3A, Vec2, Vec3};
 
 use super::Units;
-use super::gutters::Gutters;
+use super::gutters::{Gutters, Tip};
 use super::islands::Islands;
+use super::landings::Landing;
 use super::links::Links;
 use super::ownership::NOBODY;
 use super::slopes::Slopes;
@@ -121,7 +122,8 @@ impl TexelGeometry {
 
     /// The texel that stands for the surface at this one: itself if a triangle owns it; else, up to 8 texels
     /// off an island (columns plus rows), the one that a way over the mesh straight across the island's
-    /// border leads to. Where the mesh ends at that border, the texel of the border. None further out.
+    /// border leads to. Where the mesh ends at that border, the texel of the border. None further out, but for texels
+    /// that bilinear filtering of a triangle reads: those have the nearest one on the mesh.
     pub fn stand_in(&self, texel: u32) -> Option<u32> {
         match self.layout.owner[texel as usize] {
             NOBODY => None,
@@ -165,10 +167,45 @@ impl TexelGeometry {
         islands.stray(island, texel).or_else(|| islands.towards(home, texel, is_of_island)).unwrap_or(home)
     }
 
+    /// Who gets what falls over a texel from a stamp that is kept to an island, or lies on one alone (`None`): as
+    /// [`Self::on_island`] or [`Self::stand_in`] has it, but over seams shared out among the texels under its image there. None where
+    /// nothing stands for the surface.
+    #[inline]
+    pub(crate) fn landing(&self, island: Option<u32>, over: u32, home: u32) -> Option<Landing<'_>> {
+        let layout = &*self.layout;
+        let number = layout.owner[over as usize];
+        if number < STAND_IN && island.is_none_or(|island| layout.islands.of(number) == island) {
+            return Some(Landing::One(over));
+        }
+        self.landing_beside(island, over, home)
+    }
+
+    /// The same for a texel that is not of the island.
+    fn landing_beside(&self, island: Option<u32>, over: u32, home: u32) -> Option<Landing<'_>> {
+        let layout = &*self.layout;
+        let next_to = match layout.owner[over as usize] {
+            number if (STAND_IN..NOBODY).contains(&number) => {
+                Some(layout.stand_ins[(number - STAND_IN) as usize][1])
+            }
+            _ => None,
+        };
+        let shared = island.or(next_to).and_then(|island| layout.islands.shared(island, over));
+        shared.or_else(|| match island {
+            Some(island) => Some(Landing::One(self.on_island(island, over, home))),
+            None => self.stand_in(over).map(Landing::One),
+        })
+    }
+
     /// For a texel that nobody owns but that lies within 2 columns and 2 rows of one that somebody does: the
-    /// nearest such texel in the image. None for all others.
+    /// nearest such texel in the image. For one that bilinear filtering reads from a triangle whose island has none so near: the nearest
+    /// on the mesh. None for all others.
     pub fn gutter_source(&self, texel: u32) -> Option<u32> {
         self.layout.gutters.source(texel)
+    }
+
+    /// Texels beside islands so thin that they own none near them.
+    pub(crate) fn tips(&self) -> &[Tip] {
+        self.layout.gutters.tips()
     }
 
     /// Adds the tiles that show anything of these, beyond their own texels.

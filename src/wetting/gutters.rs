@@ -1,7 +1,13 @@
 //! Texels between the islands of a map: no triangle lies on them, but stamps do, and the filter of a sampler.
+//!
+//! Who stands for them is found ring by ring around the texels that triangles own. What the filter reaches from tips of
+//! islands so thin that no ring comes there, or that of another island first, is added afterwards ([`touched`]).
+
+use bevy::math::Vec2;
 
 use super::finder::Finder;
 use super::grid::{Grid, Side};
+use super::touched::{Touched, touched};
 use crate::overlay::TILE_SIZE;
 
 /// Rings of texels around the islands that have a stand-in.
@@ -14,8 +20,23 @@ const SOURCE_TEXELS: i32 = 2;
 pub(super) struct Gutters {
     /// Ascending by texel.
     stand_ins: Vec<StandIn>,
-    /// A texel, and the owned one nearest to it in the image; ascending.
+    /// A texel, and the owned one nearest to it in the image, or on the mesh if it is one of the tips; ascending.
     sources: Vec<(u32, u32)>,
+    /// Ascending by texel.
+    tips: Vec<Tip>,
+}
+
+/// A texel that the filter of a sampler reaches from a triangle whose island owns none near it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Tip {
+    pub(crate) texel: u32,
+    /// The owned texel that it shows.
+    pub(crate) source: u32,
+    /// The triangle, and the weights of its second and third corner at its point closest to the texel's middle.
+    pub(crate) triangle: u32,
+    pub(crate) weights: [f32; 2],
+    /// The way from there to the middle, in texels.
+    pub(crate) away: Vec2,
 }
 
 /// Who stands for the surface at a texel that no triangle owns.
@@ -24,8 +45,8 @@ pub(super) struct StandIn {
     pub(super) texel: u32,
     /// The owned texel that continues the surface there.
     pub(super) other: u32,
-    /// The owned texel of the nearest island, from which the way led there.
-    pub(super) from: u32,
+    /// A triangle of the nearest island, from which the way led there.
+    pub(super) triangle: u32,
 }
 
 /// A texel of a ring.
@@ -62,8 +83,8 @@ impl Gutters {
     }
 
     /// Goes outwards from the islands ring by ring, over the sides of texels. What continues the surface at a
-    /// texel is found by a walk from the island straight over its border.
-    pub(super) fn new(finder: &Finder) -> Self {
+    /// texel is found by a walk from the island straight over its border. `islands`: of all triangles.
+    pub(super) fn new(finder: &Finder, islands: &[u32]) -> Self {
         let grid = finder.grid;
         let mut seen: Vec<bool> =
             (0..grid.texels() as u32).map(|texel| finder.owners.of(texel).is_some()).collect();
@@ -76,7 +97,7 @@ impl Gutters {
             .filter(borders)
             .map(|texel| Reached { texel, from: texel, offset: [0, 0] })
             .collect();
-        let mut gutters = Self { stand_ins: Vec::new(), sources: Vec::new() };
+        let mut gutters = Self { stand_ins: Vec::new(), sources: Vec::new(), tips: Vec::new() };
         for number in 1..=STAND_IN_RINGS {
             let mut next = Vec::new();
             for reached in &ring {
@@ -89,7 +110,9 @@ impl Gutters {
             next.sort_unstable_by_key(|reached| reached.texel);
             for reached in &next {
                 let &Reached { texel, from, offset } = reached;
-                gutters.stand_ins.push(StandIn { texel, other: finder.stand_in(from, offset), from });
+                let (other, triangle) =
+                    (finder.stand_in(from, offset), finder.owners.triangle[from as usize]);
+                gutters.stand_ins.push(StandIn { texel, other, triangle });
                 // No ring beyond that of the corners has a part in the square.
                 if number <= 2 * SOURCE_TEXELS
                     && let Some(source) = nearest_in_image(finder, reached.texel)
@@ -101,8 +124,46 @@ impl Gutters {
         }
         gutters.stand_ins.sort_unstable();
         gutters.sources.sort_unstable();
+        gutters.add_tips(finder, islands);
         gutters.sources.shrink_to_fit();
         gutters
+    }
+
+    /// Adds what triangles reach but no ring of their island does, or that of another one first though it lies further away.
+    fn add_tips(&mut self, finder: &Finder, islands: &[u32]) {
+        let beside = |texel: u32| self.stand_ins.binary_search_by_key(&texel, |stand_in| stand_in.texel).ok();
+        let is_beside = |texel: u32, triangle: u32| {
+            beside(texel).is_some_and(|index| {
+                islands[self.stand_ins[index].triangle as usize] == islands[triangle as usize]
+            })
+        };
+        let (mut stand_ins, mut sources, mut tips) = (Vec::new(), Vec::new(), Vec::new());
+        for Touched { texel, place, away } in touched(finder, is_beside) {
+            let triangle = place.triangle;
+            let is_known = is_beside(texel, triangle);
+            let shown = self.source(texel).and_then(|source| finder.owners.of(source));
+            let is_shown = shown.is_some_and(|owner| islands[owner as usize] == islands[triangle as usize]);
+            if is_known && is_shown {
+                continue;
+            }
+            let Some(other) = finder.nearest_to(&place, texel) else { continue };
+            if !is_known {
+                stand_ins.push(StandIn { texel, other, triangle });
+            }
+            if !is_shown {
+                sources.push((texel, other));
+                let weights = [place.weights[1], place.weights[2]].map(|weight| weight as f32);
+                tips.push(Tip { texel, source: other, triangle, weights, away: away.as_vec2() });
+            }
+        }
+        put_instead(&mut self.stand_ins, stand_ins, |stand_in| stand_in.texel);
+        put_instead(&mut self.sources, sources, |&(texel, _)| texel);
+        self.tips = tips;
+    }
+
+    /// Texels of thin tips, ascending; all of them have sources.
+    pub(super) fn tips(&self) -> &[Tip] {
+        &self.tips
     }
 
     /// Who stands for unowned texels, ascending; afterwards nobody does.
@@ -110,15 +171,30 @@ impl Gutters {
         std::mem::take(&mut self.stand_ins)
     }
 
-    /// The owned texel nearest to an unowned one.
+    /// The owned texel that an unowned one shows.
     pub(super) fn source(&self, texel: u32) -> Option<u32> {
         look_up(&self.sources, texel)
     }
 
     /// Memory held, bytes.
     pub(super) fn bytes(&self) -> usize {
-        self.stand_ins.capacity() * size_of::<StandIn>() + self.sources.capacity() * size_of::<(u32, u32)>()
+        self.stand_ins.capacity() * size_of::<StandIn>()
+            + self.sources.capacity() * size_of::<(u32, u32)>()
+            + self.tips.capacity() * size_of::<Tip>()
     }
+}
+
+/// Puts rows into a list that ascends by texel, in place of those of the same texels.
+fn put_instead<T>(list: &mut Vec<T>, rows: Vec<T>, texel: impl Fn(&T) -> u32) {
+    let mut added = Vec::new();
+    for row in rows {
+        match list.binary_search_by_key(&texel(&row), &texel) {
+            Ok(index) => list[index] = row,
+            Err(_) => added.push(row),
+        }
+    }
+    list.append(&mut added);
+    list.sort_unstable_by_key(texel);
 }
 
 fn look_up(list: &[(u32, u32)], texel: u32) -> Option<u32> {

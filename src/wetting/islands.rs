@@ -8,7 +8,8 @@
 //! other island's: beside it in the image, anywhere on the mesh. What belongs there instead is found once, when the mesh is
 //! measured. From each island, ring by ring, a way goes straight over its border and on over the mesh; a texel of the rings
 //! for which that comes to something else than [`TexelGeometry::stand_in`](super::TexelGeometry::stand_in) is a *stray* of
-//! that island. Tiles that lie on one island alone are marked: stamps within them need not ask at all.
+//! that island. What goes over a seam is shared out among several texels ([`Landings`]). Tiles that lie on one island alone are
+//! marked: stamps within them need not ask at all.
 //!
 //! Not here: what lies further out than the rings goes to the island's nearest texel in its row or column. An atlas of
 //! thousands of small islands gets fewer rings, as many as there is memory for.
@@ -16,6 +17,7 @@
 use super::finder::Finder;
 use super::grid::{Grid, Side};
 use super::gutters::{Reached, StandIn};
+use super::landings::{Landing, Landings, Sharing};
 use super::ownership::NOBODY;
 use crate::overlay::{TILE_SIZE, Wrap};
 
@@ -46,24 +48,24 @@ pub(super) struct Islands {
     starts: Vec<u32>,
     /// A texel, and the owned one that gets what falls there from this island; ascending within each.
     strays: Vec<(u32, u32)>,
+    landings: Landings,
 }
 
 impl Islands {
-    /// Finds all islands and their strays. `stand_ins`: of texels that nobody owns.
-    pub(super) fn new(finder: &Finder, stand_ins: &[StandIn]) -> Self {
+    /// Finds the strays of all islands. `of_triangle`, `count`: by [`number_triangles`]; `stand_ins`: of texels that nobody owns.
+    pub(super) fn new(finder: &Finder, of_triangle: Vec<u32>, count: u32, stand_ins: &[StandIn]) -> Self {
         let grid = finder.grid;
-        let (of_triangle, count) = number_triangles(finder);
         let mut whose: Vec<u32> = finder.owners.triangle.clone();
         for island in whose.iter_mut().filter(|owner| **owner != NOBODY) {
             *island = of_triangle[*island as usize];
         }
-        // Texels that are owned have no stand-in, so the island behind it is there already.
         for stand_in in stand_ins {
-            whose[stand_in.texel as usize] = whose[stand_in.from as usize];
+            whose[stand_in.texel as usize] = of_triangle[stand_in.triangle as usize];
         }
         let tiles = islands_of_tiles(&whose, grid.size);
         let is_alone = tiles.iter().all(|&island| island != SHARED && island == tiles[0]);
-        let mut islands = Self { grid, of_triangle, tiles, is_alone, starts: Vec::new(), strays: Vec::new() };
+        let (starts, strays, landings) = (Vec::new(), Vec::new(), Landings::default());
+        let mut islands = Self { grid, of_triangle, tiles, is_alone, starts, strays, landings };
         islands.find_strays(finder, &whose, count as usize);
         islands
     }
@@ -101,6 +103,11 @@ impl Islands {
         Some(strays[index].1)
     }
 
+    /// Who shares what falls over a texel that is not of an island from a stamp that is; None if one gets all.
+    pub(super) fn shared(&self, island: u32, texel: u32) -> Option<Landing<'_>> {
+        self.landings.get(island, texel)
+    }
+
     /// On the way from a texel to `home` along its row or its column, the nearest one that `is_meant`; none within
     /// [`FARTHEST_LOOK`].
     pub(super) fn towards(&self, home: u32, texel: u32, is_meant: impl Fn(u32) -> bool) -> Option<u32> {
@@ -126,6 +133,7 @@ impl Islands {
     pub(super) fn bytes(&self) -> usize {
         (self.of_triangle.capacity() + self.tiles.capacity() + self.starts.capacity()) * size_of::<u32>()
             + self.strays.capacity() * size_of::<(u32, u32)>()
+            + self.landings.bytes()
     }
 
     /// Goes outwards from each of `count` islands, whatever lies there. `whose`: the island that each texel lies on or next to.
@@ -143,16 +151,18 @@ impl Islands {
         }
         borders.sort_unstable();
         let with_texels = borders.chunk_by(|one, other| one.0 == other.0).count();
-        let rings = rings_within(grid.texels() as u64, borders.len() as u64, with_texels as u64);
+        let rings_of = |texels: usize| rings_within(texels as u64, borders.len() as u64, with_texels as u64);
+        // Half of that for what takes several times as much memory a texel.
+        let (rings, shared_rings) = (rings_of(grid.texels()), rings_of(grid.texels() / 2));
         let mut seen = vec![NOBODY; grid.texels()];
-        let (mut ring, mut next) = (Vec::new(), Vec::new());
+        let (mut ring, mut next, mut sharing) = (Vec::new(), Vec::new(), Sharing::default());
         for border in borders.chunk_by(|one, other| one.0 == other.0) {
             let island = border[0].0;
             // Islands without texels have no strays either.
             self.starts.resize(island as usize + 1, self.strays.len() as u32);
             ring.clear();
             ring.extend(border.iter().map(|&(_, texel)| Reached { texel, from: texel, offset: [0; 2] }));
-            for _ in 0..rings {
+            for number in 0..rings {
                 for reached in &ring {
                     for onward in Side::ALL.into_iter().filter_map(|side| reached.onward(grid, side)) {
                         let Reached { texel, from, offset } = onward;
@@ -160,8 +170,15 @@ impl Islands {
                         if !is_new || is_of(texel, island) {
                             continue;
                         }
-                        if whose[texel as usize] != island {
-                            self.strays.push((texel, finder.stray(from, offset, texel)));
+                        let (is_stray, is_shared) = (whose[texel as usize] != island, number < shared_rings);
+                        let across = if is_stray || is_shared { finder.across(from, offset) } else { None };
+                        if is_stray {
+                            self.strays.push((texel, finder.stray(from, offset, texel, across.as_ref())));
+                        }
+                        let image = across.filter(|_| is_shared);
+                        if let Some(image) = image.and_then(|across| finder.image(from, offset, &across)) {
+                            let area = finder.texel_area(finder.owners.triangle[from as usize]);
+                            sharing.add(finder, &self.of_triangle, texel, area, &image);
                         }
                         next.push(onward);
                     }
@@ -170,9 +187,12 @@ impl Islands {
                 next.clear();
             }
             self.strays[self.starts[island as usize] as usize..].sort_unstable();
+            self.landings.add(island, &mut sharing);
         }
         self.starts.resize(count + 1, self.strays.len() as u32);
         self.strays.shrink_to_fit();
+        self.landings.end(count as u32);
+        self.landings.shrink();
     }
 }
 
@@ -199,7 +219,7 @@ fn islands_of_tiles(whose: &[u32], size: u32) -> Vec<u32> {
 }
 
 /// The island of each triangle, and how many islands there are.
-fn number_triangles(finder: &Finder) -> (Vec<u32>, u32) {
+pub(super) fn number_triangles(finder: &Finder) -> (Vec<u32>, u32) {
     let triangles = finder.surface.map.len() as u32;
     let mut groups = Groups((0..triangles).collect());
     for triangle in 0..triangles {

@@ -8,7 +8,7 @@ use super::finder::Finder;
 use super::geometry::{STAND_IN, TexelGeometry, TexelLayout};
 use super::grid::Grid;
 use super::gutters::Gutters;
-use super::islands::Islands;
+use super::islands::{Islands, number_triangles};
 use super::links::Links;
 use super::ownership::Ownership;
 use super::points::front_normals;
@@ -33,9 +33,10 @@ impl TexelGeometry {
         let surface = Surface::new(triangles, world_from_mesh, grid);
         let owners = Ownership::new(triangles, grid);
         let finder = Finder::new(grid, &surface, &owners);
-        let (links, mut gutters) = (Links::new(&finder), Gutters::new(&finder));
+        let (of_triangle, count) = number_triangles(&finder);
+        let (links, mut gutters) = (Links::new(&finder), Gutters::new(&finder, &of_triangle));
         let stand_ins = gutters.take_stand_ins();
-        let islands = Islands::new(&finder, &stand_ins);
+        let islands = Islands::new(&finder, of_triangle, count, &stand_ins);
         let above_origin =
             |texel: u32| finder.place(texel).map(|place| surface.in_space(&place).dot(up.as_dvec3()) as f32);
         let heights = (0..grid.texels() as u32).map(above_origin);
@@ -53,10 +54,8 @@ impl TexelGeometry {
         for (number, stand_in) in (0u32..).zip(&stand_ins) {
             owner[stand_in.texel as usize] = STAND_IN | number;
         }
-        let stand_ins = stand_ins
-            .iter()
-            .map(|stand_in| [stand_in.other, islands.of(owner[stand_in.from as usize])])
-            .collect();
+        let stand_ins =
+            stand_ins.iter().map(|stand_in| [stand_in.other, islands.of(stand_in.triangle)]).collect();
         let layout = TexelLayout {
             size,
             area_mm2: areas.mm2,

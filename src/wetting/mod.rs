@@ -33,6 +33,7 @@ pub mod gpu;
 mod grid;
 mod gutters;
 mod islands;
+mod landings;
 mod links;
 pub mod look;
 mod marks;
@@ -59,6 +60,7 @@ mod texel;
 mod tick;
 mod tiles;
 mod timing;
+mod touched;
 mod walk;
 
 use bevy::prelude::*;

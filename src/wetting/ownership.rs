@@ -205,18 +205,22 @@ struct Window {
 }
 
 /// A triangle on the map, in texels.
-struct Outline {
+pub(super) struct Outline {
     corners: [Vec2; 3],
     footprint: Footprint,
-    low: Vec2,
-    high: Vec2,
+    pub(super) low: Vec2,
+    pub(super) high: Vec2,
     /// Twice the area with the sign of the winding, inverted.
     inverse_area: f32,
 }
 
 impl Outline {
     fn new(uvs: &[Vec2; 3], size: u32) -> Self {
-        let corners = uvs.map(|uv| uv * size as f32);
+        Self::of(uvs.map(|uv| uv * size as f32))
+    }
+
+    /// With these corners, in texels.
+    pub(super) fn of(corners: [Vec2; 3]) -> Self {
         let footprint = Footprint::new(corners);
         let (low, high) = footprint.bounds();
         let [a, b, c] = corners;
@@ -229,9 +233,23 @@ impl Outline {
     }
 
     /// Whether its box is larger than the map by more than a texel, as `TexelAreas` sees it.
-    fn is_larger_than(&self, size: u32) -> bool {
+    pub(super) fn is_larger_than(&self, size: u32) -> bool {
         let extent = self.high - self.low;
         extent.max_element() > size as f32 + 1.0
+    }
+
+    /// Whether any point of it lies less than a texel from this one, along u and along v.
+    pub(super) fn reaches(&self, point: Vec2) -> bool {
+        let corners = self.corners.map(|corner| corner - point);
+        let is_in_box = (self.low - point).max_element() < 1.0 && (self.high - point).min_element() > -1.0;
+        is_in_box
+            && [(0, 1), (1, 2), (2, 0)].into_iter().all(|(from, to)| {
+                // What boxes do not tell apart, a line along an edge does.
+                let across = (corners[to] - corners[from]).perp();
+                let reach = across.abs().element_sum();
+                let sides = corners.map(|corner| corner.dot(across));
+                sides.iter().any(|&side| side <= reach) && sides.iter().any(|&side| side >= -reach)
+            })
     }
 
     /// Weights of the second and third corner at a point that it covers.
@@ -243,7 +261,7 @@ impl Outline {
     }
 
     /// Weights of the second and third corner at the point of its edges that is closest to `point`.
-    fn closest_weights(&self, point: Vec2) -> [f32; 2] {
+    pub(super) fn closest_weights(&self, point: Vec2) -> [f32; 2] {
         // Of a triangle that is a point on the map, any will do.
         let mut closest = (f32::INFINITY, [1.0 / 3.0; 3]);
         for (from, to) in [(0, 1), (1, 2), (2, 0)] {

@@ -4,11 +4,12 @@
 //! the fastest drop. So a texel under a hundred stamps is visited once.
 //!
 //! A stamp is columns and rows of the image. Where these leave its island, the water does not: it goes over the mesh, and not to
-//! what happens to lie beside ([`TexelGeometry::on_island`](super::TexelGeometry)). Few stamps reach so far; they are gathered
-//! island by island.
+//! what happens to lie beside ([`TexelGeometry::landing`](super::TexelGeometry)), and is shared out evenly there. Few stamps reach so
+//! far; they are gathered island by island.
 
-use super::arrivals::{Arrivals, Parcel};
+use super::arrivals::{Arrivals, Grid, Parcel};
 use super::flow::LEAST_RETAINED;
+use super::landings::Landing;
 use super::now::Now;
 use super::surface::SurfaceWater;
 use super::tiles::Tiles;
@@ -53,7 +54,7 @@ pub(crate) struct SoakScratch {
 }
 
 /// Puts the drops of a tick on the surface: to each texel its share of their stamps. What would fall beside the island that was
-/// hit goes to the texel that continues it there, across the seam, or to its border.
+/// hit goes to the texels that continue it there, across the seam, or to its border.
 pub(crate) fn soak(
     water: &mut SurfaceWater,
     now: &Now,
@@ -67,16 +68,17 @@ pub(crate) fn soak(
     }
     let SoakScratch { columns, arrivals, beyond, hits, wetted } = scratch;
     let size = water.size;
-    let cell_of = |[x, y]: [u32; 2], texel: u32| {
-        // Mostly it is the one that it falls over: no division.
-        if texel == y * size + x { [x, y] } else { [texel % size, texel / size] }
-    };
-    let to_texel = |cell: [u32; 2], parcel: Parcel| {
-        cell_of(cell, now.geometry.stand_in(cell[1] * size + cell[0]).unwrap_or(parcel.home))
-    };
-    let to_island = |island: u32| {
-        move |cell: [u32; 2], parcel: Parcel| {
-            cell_of(cell, now.geometry.on_island(island, cell[1] * size + cell[0], parcel.home))
+    let lay_on = |island: Option<u32>| {
+        move |texels: &mut Grid, cell: [u32; 2], parcel: Parcel| {
+            let over = cell[1] * size + cell[0];
+            let mut lay =
+                |texel: u32, nl: u64| texels.add([texel % size, texel / size], Parcel { nl, ..parcel });
+            match now.geometry.landing(island, over, parcel.home) {
+                // Mostly it is the one that it falls over: no division.
+                Some(Landing::One(texel)) if texel == over => texels.add(cell, parcel),
+                Some(landing) => landing.share(parcel.nl, lay),
+                None => lay(parcel.home, parcel.nl),
+            }
         }
     };
     arrivals.begin(size);
@@ -84,10 +86,10 @@ pub(crate) fn soak(
         let stamp = Stamp::new(drop, size);
         let [columns_of, rows_of] = stamp.texels();
         match now.geometry.island_to_keep_to(texel_under(drop.center, size), columns_of, rows_of) {
-            None => gather(water, now, drop, &stamp, columns, arrivals, to_texel),
+            None => gather(water, now, drop, &stamp, columns, arrivals, lay_on(None)),
             // In texels nothing is mixed with what others bring.
             Some(island) if stamp.level == 0 => {
-                gather(water, now, drop, &stamp, columns, arrivals, to_island(island));
+                gather(water, now, drop, &stamp, columns, arrivals, lay_on(Some(island)));
             }
             Some(island) => beyond.push((island, number)),
         }
@@ -96,15 +98,15 @@ pub(crate) fn soak(
             hits.push((hit_texel(now, drop, size), drop.source));
         }
     }
-    arrivals.share_out(size, water.wrap, to_texel);
+    arrivals.share_out(size, water.wrap, lay_on(None));
     beyond.sort_unstable();
     for of_island in beyond.chunk_by(|one, other| one.0 == other.0) {
-        let to_texel = to_island(of_island[0].0);
+        let lay = lay_on(Some(of_island[0].0));
         for &(_, number) in of_island {
             let drop = &drops[number as usize];
-            gather(water, now, drop, &Stamp::new(drop, size), columns, arrivals, to_texel);
+            gather(water, now, drop, &Stamp::new(drop, size), columns, arrivals, lay);
         }
-        arrivals.share_out(size, water.wrap, to_texel);
+        arrivals.share_out(size, water.wrap, lay);
     }
     beyond.clear();
     arrivals.drain(|[x, y], parcel| {
@@ -173,7 +175,7 @@ fn gather(
     stamp: &Stamp,
     columns: &mut Vec<(u32, [u32; 2])>,
     arrivals: &mut Arrivals,
-    to_texel: impl Fn([u32; 2], Parcel) -> [u32; 2],
+    lay: impl Fn(&mut Grid, [u32; 2], Parcel),
 ) {
     let (level, stamp) = (stamp.level, &stamp.splat);
     let (size, wrap) = (water.size >> level, water.wrap);
@@ -190,7 +192,8 @@ fn gather(
             let nl = u64::from(share(in_row, column));
             if nl > 0 {
                 let (cell, parcel) = ([x, y], Parcel { nl, home, speed_cm, is_jet });
-                arrivals.add(level, if level == 0 { to_texel(cell, parcel) } else { cell }, parcel);
+                let grid = arrivals.grid(level);
+                if level == 0 { lay(grid, cell, parcel) } else { grid.add(cell, parcel) }
             }
         }
     }
@@ -244,7 +247,7 @@ pub(crate) fn note_arrival(water: &mut SurfaceWater, now: &Now, texel: u32, tile
 mod tests {
     use super::super::TexelGeometry;
     use super::super::points::surface_points;
-    use super::super::test_meshes::{Cube, floor, joined, sheet};
+    use super::super::test_meshes::{Cube, floor, joined, sheet, turned_neighbours};
     use super::*;
     use crate::collision::MeshTriangles;
     use crate::material::PorousMaterial;
@@ -355,5 +358,35 @@ mod tests {
                 assert_eq!(on_both, 50_000_000);
             }
         }
+    }
+
+    #[test]
+    fn a_drop_on_a_seam_is_as_smooth_on_a_neighbour_that_is_turned_and_scaled() {
+        let mesh = turned_neighbours();
+        let geometry = geometry(&mesh, 128);
+        let center = [40 * 256 - 1, 28 * 256];
+        let water = soaked(&geometry, &[drop_at(center, 6, 50_000_007)]);
+        assert_eq!(held_nl(&water, &geometry, 0..64), 50_000_007);
+        let all: u64 = water.texels().iter().map(|texel| texel.total()).sum();
+        // The quadratic B-spline over 12 texels: what a texel so far from its middle gets.
+        let bump = |away: f32| match away.abs() / 4.0 {
+            near if near < 0.5 => (0.75 - near * near) / 4.0,
+            far if far < 1.5 => (1.5 - far).powi(2) / 8.0,
+            _ => 0.0,
+        };
+        let mut wet = 0;
+        for point in surface_points(&mesh, &Affine3A::IDENTITY, 128, CLAMP) {
+            if point.triangle < 32 {
+                continue;
+            }
+            // Where it would lie if the first island went on.
+            let away = [4.3 + 36.0 * point.position.x - 40.0, 10.0 + 36.0 * point.position.z - 28.0];
+            let expected = bump(away[0]) * bump(away[1]) / (1.3 * 1.3);
+            let got = water.texels()[point.texel as usize].total() as f32 / all as f32;
+            let most = (0.75f32 / 4.0).powi(2) / (1.3 * 1.3);
+            assert!((got - expected).abs() < 0.2 * most, "{away:?}: {got} {expected}");
+            wet += u32::from(got > 0.2 * most);
+        }
+        assert!(wet > 25, "{wet}");
     }
 }

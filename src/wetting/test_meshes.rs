@@ -58,6 +58,19 @@ pub(crate) fn corner_of_a_map() -> TexelGeometry {
     TexelGeometry::new(&triangle, &Affine3A::IDENTITY, Vec3::Y, 16, [Wrap::Clamp; 2])
 }
 
+/// Two squares of a metre side by side along x, of 32 triangles each, on a map of 128 texels: an island of 36 texels, and one of 1.3 times
+/// as many along each side that is turned by 30 degrees. The seam between them lies at x = 1, 40.3 columns from the left.
+pub(super) fn turned_neighbours() -> MeshTriangles {
+    let first = sheet(4, floor, |point| (Vec2::new(4.3, 10.0) + point * 36.0) / 128.0);
+    let turned = |point: Vec2| Vec2::from_angle(TAU / 12.0).rotate(point) * (36.0 * 1.3);
+    let second = sheet(
+        4,
+        |point| floor(point) + Vec3::X,
+        move |point| (Vec2::new(80.3, 45.7) + turned(point)) / 128.0,
+    );
+    joined([first, second])
+}
+
 /// [`sheet`] is wound so that it faces down there; this turns a mesh round.
 pub(super) fn turned_round(mut mesh: MeshTriangles) -> MeshTriangles {
     mesh.positions.iter_mut().for_each(|corners| corners.swap(1, 2));

@@ -29,8 +29,8 @@ use crate::seams::{MIDDLE, SIZE, bunny, edges, is_seam, mesh_of, throw};
 const MOST_PAINTED: Differences =
     Differences { apart: Measure { mean: 2.0, high: 6.0 }, line: Measure { mean: 1.0, high: 3.0 } };
 
-/// The same under water. What falls over a border between turned islands goes from one texel to one texel, so it is speckled
-/// there: that is in `line`.
+/// The same under water. Texels on either side of a border between turned islands lie askew to each other, and each holds an amount
+/// of its own: that is in `line`.
 const MOST_WET: Differences =
     Differences { apart: Measure { mean: 2.5, high: 8.0 }, line: Measure { mean: 4.0, high: 12.0 } };
 
