@@ -50,7 +50,7 @@ pub use mips::{Lying, mip_chain, mip_levels};
 pub use pool::{
     MapBudget, MapLoss, MapNeed, MapPool, MapSize, SizeMaps, SurfaceEvicted, SurfaceResized, Unmapped,
 };
-pub(crate) use pool::{can_put_size, put_first_size, put_size};
+pub(crate) use pool::{can_put_size, is_resizing, put_first_size, put_size};
 pub use splat::Splat;
 pub use tiles::{TILE_SIZE, TileBins, TileHeader};
 
