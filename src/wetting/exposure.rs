@@ -245,6 +245,10 @@ pub(super) fn bake_exposure(
         for (entity, geometry, exposure) in baked {
             let Ok((_, current, _, _, mut water, material, old)) = surfaces.get_mut(entity) else { continue };
             if !Arc::ptr_eq(&geometry, current.0.layout()) {
+                if geometry.size != current.0.size() {
+                    // Its maps have got another size meanwhile, and what is new is in its way all the same.
+                    progress.surfaces = 0;
+                }
                 continue;
             }
             // What has dried until now has dried by the old one.
