@@ -321,12 +321,11 @@ mod tests {
     fn what_grows_is_charged_at_once_and_what_shrinks_until_it_has() {
         let grows = Mapped { target: Some(256), ..mapped(0, 1, 128) };
         let shrinks = Mapped { target: Some(64), ..mapped(1, 1, 128) };
-        let room = Room::new(NEED.bytes(256) + NEED.bytes(128), vec![grows, shrinks]);
+        let mut room = Room::new(NEED.bytes(256) + NEED.bytes(128), vec![grows, shrinks]);
         assert!(room.has(0) && !room.has(1));
         // The larger one can be halved again, but not before it is there; until then nobody has to lose its maps.
         let coming = NEED.bytes(128) - NEED.bytes(64) + NEED.bytes(256) - NEED.bytes(64);
         assert!(room.will_have(coming) && !room.will_have(coming + 1));
-        let mut room = room;
         assert!(room.give_way(coming, u32::MAX).is_empty());
     }
 }
