@@ -43,7 +43,9 @@ use crate::effect::RefreshEffects;
 
 pub use loss::MapLoss;
 pub use plan::MapNeed;
-pub(crate) use resize::{can_put_size, is_resizing, put_first_size, put_size};
+pub(crate) use resize::{
+    can_put_size, can_resume_resizing, is_resizing, put_first_size, put_size, resizing_of, resume_resizing,
+};
 
 /// How much memory of the GPU the maps of all surfaces may take, and how fine they are. May be changed at any time: where
 /// it becomes too little, maps are halved, and taken away where that is not enough.

@@ -206,6 +206,31 @@ pub(crate) fn is_resizing(world: &mut World) -> bool {
     timing == MeasureTiming::WhenReady && world.query::<&Resizing>().iter(world).next().is_some()
 }
 
+/// To how many texels along each side a surface is on its way, and since which tick.
+pub(crate) fn resizing_of(world: &World, surface: Entity) -> Option<(u32, u32)> {
+    world.get::<Resizing>(surface).map(|resizing| (resizing.to, resizing.asked_at))
+}
+
+/// Whether a surface may be on its way from maps of one size to those of another. `from`, `to`: texels along each side.
+pub(crate) fn can_resume_resizing(world: &World, surface: Entity, from: u32, to: u32) -> bool {
+    let limit = world.get::<MapSize>(surface).map_or(0, |size| size.limit);
+    let is_step = to != from && to <= 2 * from && is_reached(from, to);
+    is_step && to.is_multiple_of(TILE_SIZE) && to <= limit
+}
+
+/// Sends a surface on its way to maps of another size, as if it had been since a tick: for a scene that is put back as it was.
+pub(crate) fn resume_resizing(world: &mut World, surface: Entity, to: u32, since: u32) {
+    let Ok(mut entity) = world.get_entity_mut(surface) else { return };
+    let (Some(settings), Some(collider), Some(transform)) =
+        (entity.get::<Weatherable>(), entity.get::<SurfaceCollider>(), entity.get::<GlobalTransform>())
+    else {
+        return;
+    };
+    let in_space = entity.contains::<SurfaceFrames>();
+    let resizing = Resizing::begin(to, settings.wrap(), collider, transform, in_space, since);
+    entity.insert(resizing);
+}
+
 /// Whether [`put_size`] can give a surface maps with so many texels along each side.
 pub(crate) fn can_put_size(world: &World, surface: Entity, to: u32) -> bool {
     let (Some(size), Some(geometry)) = (world.get::<MapSize>(surface), world.get::<WetGeometry>(surface))
@@ -343,5 +368,19 @@ mod tests {
         let (mut world, surface) = resizing();
         world.entity_mut(surface).remove::<SurfaceCollider>();
         assert_eq!(finished(&mut world, surface), (64, 64, 0));
+    }
+
+    #[test]
+    fn what_was_under_way_can_be_taken_up_again_if_it_leads_to_maps_that_there_may_be() {
+        let (mut world, surface) = resizing();
+        assert_eq!(resizing_of(&world, surface), Some((32, 0)));
+        world.entity_mut(surface).remove::<Resizing>();
+        assert_eq!(resizing_of(&world, surface), None);
+        let can = |from, to| can_resume_resizing(&world, surface, from, to);
+        assert!([(64, 32), (64, 16), (32, 64)].into_iter().all(|(from, to)| can(from, to)));
+        let others = [(64, 0), (0, 32), (64, 64), (64, 48), (32, 8), (16, 64), (64, 128)];
+        assert!(others.into_iter().all(|(from, to)| !can(from, to)));
+        resume_resizing(&mut world, surface, 32, 0);
+        assert_eq!(finished(&mut world, surface), (32, 32, 1));
     }
 }
