@@ -50,7 +50,9 @@ pub use mips::{Lying, mip_chain, mip_levels};
 pub use pool::{
     MapBudget, MapLoss, MapNeed, MapPool, MapSize, SizeMaps, SurfaceEvicted, SurfaceResized, Unmapped,
 };
-pub(crate) use pool::{can_put_size, put_first_size, put_size};
+pub(crate) use pool::{
+    can_put_size, can_resume_resizing, is_resizing, put_first_size, put_size, resizing_of, resume_resizing,
+};
 pub use splat::Splat;
 pub use tiles::{TILE_SIZE, TileBins, TileHeader};
 

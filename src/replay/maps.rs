@@ -107,6 +107,8 @@ struct Received(Vec<(Entity, usize, Vec<u8>)>);
 impl Run<'_> {
     /// The maps of all surfaces, in the order of the scenario.
     pub(super) fn read_maps(&mut self) -> Result<Vec<SurfaceMaps>, ReplayError> {
+        // What is due at this tick takes effect before anything is read: not while maps come back from the GPU, and without one, too.
+        self.step(0)?;
         if self.options.render {
             self.finish_painting()?;
         }

@@ -74,11 +74,13 @@ impl<'a> Run<'a> {
         self.app.world().resource::<WeatheringClock>().tick()
     }
 
-    /// Goes on to the end of a tick: a quarter of a second at a time, so that progress can be told.
+    /// Goes on to the end of a tick: to the next quarter of a second at a time, so that progress can be told. Wherever it begins, frames
+    /// are those of a run from the start: some things take effect at the start of a frame.
     pub(super) fn go_on(&mut self, end: u32, mut tell: impl FnMut(u32)) -> Result<(), ReplayError> {
         let quarter = (self.app.world().resource::<WeatheringClock>().hz() / 4).max(1);
         while self.tick() < end {
-            self.advance(quarter.min(end - self.tick()))?;
+            let tick = self.tick();
+            self.advance((quarter - tick % quarter).min(end - tick))?;
             tell(self.tick());
         }
         Ok(())

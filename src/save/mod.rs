@@ -32,7 +32,7 @@ use crate::clock::WeatheringClock;
 use crate::emitter::{EmissionSeed, Emitter, EmitterState, NewParticles};
 use crate::material::{PorousMaterial, StandingWater};
 use crate::matter::{MatterLedger, SurfaceMatter, bind_dried};
-use crate::overlay::{MapLoss, MapSize, SurfaceTotals, SurfaceTraces, TILE_SIZE, Wrap};
+use crate::overlay::{MapLoss, MapSize, SurfaceTotals, SurfaceTraces, TILE_SIZE, Wrap, resizing_of};
 use crate::particle::{ParticleCounts, Particles, SavedParticle, WaterCounts};
 use crate::scenario::{Digest, LoadedScenario, ScenarioSurface};
 use crate::weather::{DryingClock, DryingPoint, Weather};
@@ -109,6 +109,9 @@ pub(super) struct SurfaceState {
     /// What was lost with maps.
     #[serde(default)]
     pub(super) loss: MapLoss,
+    /// Maps of another size that it is on its way to: texels along each side, and the tick since which it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) resizing: Option<(u32, u32)>,
     /// What it is made of, and water that stands on it; left out where that is for the scenario to say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) materials: Option<(PorousMaterial, StandingWater)>,
@@ -175,6 +178,7 @@ impl SavedScene {
                 totals: of(entity),
                 traces: world.get::<SurfaceTraces>(entity).copied().unwrap_or_default(),
                 loss: world.get::<MapLoss>(entity).copied().unwrap_or_default(),
+                resizing: resizing_of(world, entity),
                 materials: None,
             });
             surfaces.push(SavedSurface { water, matter, colors });

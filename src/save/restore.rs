@@ -14,7 +14,7 @@ use crate::emitter::{EmissionSeed, EmitterState, NewParticles};
 use crate::matter::SurfaceMatter;
 use crate::overlay::{
     CpuMaps, Lying, MapLoss, MapPool, MapSize, Overlays, SurfaceFrames, SurfaceTotals, SurfaceTraces,
-    Weatherable, can_put_size, mip_chain, put_size,
+    Weatherable, can_put_size, can_resume_resizing, mip_chain, put_size, resume_resizing,
 };
 use crate::particle::{Particle, ParticleCounts, Particles, SavedParticle};
 use crate::scenario::{Digest, LoadedScenario, check_weather, rewind};
@@ -57,6 +57,17 @@ impl SavedScene {
             // Where the budget is short, sizes follow what is hit.
             if size != surface.size && !can_put_size(world, *entity, surface.size) {
                 return Err(value(&path, &format!("size of {name}"), surface.size, size.to_string()));
+            }
+            if let Some((to, since)) = surface.resizing
+                && (since > state.tick || !can_resume_resizing(world, *entity, surface.size, to))
+            {
+                let expected = "twice its size, a half, a quarter and so on, and a tick of the past".into();
+                return Err(value(
+                    &path,
+                    &format!("resizing of {name}"),
+                    format!("({to}, {since})"),
+                    expected,
+                ));
             }
         }
         let clock = world.resource::<WeatheringClock>();
@@ -113,6 +124,9 @@ impl SavedScene {
 
         for ((entity, _), surface) in surfaces.iter().zip(&state.surfaces) {
             put_size(world, *entity, surface.size);
+            if let Some((to, since)) = surface.resizing {
+                resume_resizing(world, *entity, to, since);
+            }
         }
         if let Some(mut pool) = world.get_resource_mut::<MapPool>() {
             pool.resume_at(state.tick, state.hz);

@@ -245,6 +245,10 @@ pub(super) fn bake_exposure(
         for (entity, geometry, exposure) in baked {
             let Ok((_, current, _, _, mut water, material, old)) = surfaces.get_mut(entity) else { continue };
             if !Arc::ptr_eq(&geometry, current.0.layout()) {
+                if geometry.size != current.0.size() {
+                    // Its maps have got another size meanwhile, and what is new is in its way all the same.
+                    progress.surfaces = 0;
+                }
                 continue;
             }
             // What has dried until now has dried by the old one.
@@ -301,7 +305,9 @@ pub(super) fn bake_exposure(
 
 #[cfg(test)]
 mod tests {
+    use super::super::TexelGeometry;
     use super::*;
+    use crate::collision::MeshTriangles;
 
     #[test]
     fn on_another_map_a_texel_gets_the_mean_of_what_lay_there() {
@@ -316,6 +322,52 @@ mod tests {
         assert_eq!([0, 1, 32, 33].map(|texel| twice.bytes_at(texel)), [[3, 253]; 4]);
         assert_eq!(twice.bytes_at(2 * 32 + 3)[0], 13);
         assert_eq!(exposure.resized(32, 32), exposure);
+    }
+
+    #[test]
+    fn rays_are_cast_again_where_a_map_got_another_size_meanwhile() {
+        AsyncComputeTaskPool::get_or_init(Default::default);
+        let wrap = [Wrap::Clamp; 2];
+        let mesh = Mesh::from(Plane3d::new(Vec3::Y, Vec2::ONE));
+        let bvh = Arc::new(MeshBvh::build(MeshTriangles::from_mesh(&mesh).unwrap()));
+        let on_map = |size: u32| {
+            let geometry = TexelGeometry::new(bvh.triangles(), &Affine3A::IDENTITY, Vec3::Y, size, wrap);
+            let water = SurfaceWater::of_size(size, wrap, geometry.mean_mm2());
+            (WetGeometry(Arc::new(geometry)), water)
+        };
+        let mut world = World::new();
+        world.insert_resource(WeatheringClock::new(60));
+        world.init_resource::<DryingClock>();
+        world.init_resource::<Weather>();
+        world.init_resource::<MeshColliders>();
+        world.init_resource::<MeasureTiming>();
+        world.init_resource::<ExposureProgress>();
+        let surface = world.spawn((on_map(32), SurfaceCollider(bvh.clone()), GlobalTransform::IDENTITY)).id();
+        let look = |world: &mut World| {
+            let mut schedule = Schedule::default();
+            schedule.add_systems(bake_exposure);
+            schedule.run(world);
+            world.resource::<ExposureProgress>().is_busy()
+        };
+        let finish = |world: &mut World| {
+            let begun = std::time::Instant::now();
+            while look(world) {
+                assert!(begun.elapsed() < std::time::Duration::from_secs(60), "never ready");
+                std::thread::sleep(std::time::Duration::from_millis(1));
+            }
+        };
+        assert!(look(&mut world));
+        // It has something to go by until then.
+        let towards_sun = world.resource::<Weather>().towards_sun();
+        let before = Exposure { air: vec![7; 256], sun: vec![7; 256], towards_sun };
+        world.entity_mut(surface).insert((on_map(16), before.clone()));
+        finish(&mut world);
+        assert_eq!(world.get::<Exposure>(surface), Some(&before));
+        assert!(look(&mut world));
+        finish(&mut world);
+        assert!(world.get::<Exposure>(surface).is_some_and(|now| now.air.len() == 256 && *now != before));
+        // That was all.
+        assert!(!look(&mut world));
     }
 
     #[test]

@@ -55,6 +55,11 @@ impl Measured {
         Self { size, wrap, bvh, matrix, reshaped: false, task: None, asked_at: 0 }
     }
 
+    /// Whether it is being measured since it has got another mesh, or another map: what is known of it is of the one before.
+    pub(crate) fn is_of_new_shape(&self) -> bool {
+        self.reshaped && self.task.is_some()
+    }
+
     fn is_of(
         &self,
         map: (u32, [Wrap; 2]),

@@ -7,8 +7,8 @@ use bevy::tasks::{Task, block_on, futures::check_ready};
 use crate::clock::WeatheringClock;
 
 /// When meshes that are loaded or change are hit as they are, when surfaces that are new, turn, change their size or take another pose
-/// run by what was measured of them, when their marks know where on them they lie, and when they dry by a sun that has moved. Until then
-/// it is the old shape, slopes and shadows that count, and of what is new, none.
+/// run by what was measured of them, when their marks know where on them they lie, when they move over to maps of another size, and when
+/// they dry by a sun that has moved. Until then it is the old shape, slopes, maps and shadows that count, and of what is new, none.
 #[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[reflect(Resource)]
 pub enum MeasureTiming {

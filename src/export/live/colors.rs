@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use bevy::prelude::*;
 use bevy::render::gpu_readback::{Readback, ReadbackComplete};
 
-use crate::overlay::{Overlays, SplatQueue, SplatStats};
+use crate::overlay::{Overlays, SplatQueue, SplatStats, is_resizing};
 use crate::replay::without_padding;
 use crate::save::ColorMaps;
 
@@ -41,13 +41,13 @@ type Coming = (Entity, [Option<Vec<u8>>; 3]);
 pub struct ColorReadback(Arc<Mutex<Vec<Coming>>>);
 
 impl ColorReadback {
-    /// Whether all that fell on surfaces has been painted, and has moved over where maps get another size; what is still to be
+    /// Whether all that fell on surfaces has been painted, and none of it is on its way to maps of another size; what is still to be
     /// would be missing, and what is [lost](SplatStats::lost) is. Without a renderer it always has.
     pub fn is_painted(world: &mut World) -> bool {
-        let pending = world.get_resource::<SplatStats>().map(|stats| stats.pending() + stats.moving());
-        let Some(pending) = pending else { return true };
+        let waiting = world.get_resource::<SplatStats>().map(|stats| stats.pending() + stats.moving());
+        let Some(waiting) = waiting else { return true };
         let mut queues = world.query::<&SplatQueue>();
-        pending == 0 && queues.iter(world).all(|queue| queue.splats().is_empty())
+        waiting == 0 && queues.iter(world).all(|queue| queue.splats().is_empty()) && !is_resizing(world)
     }
 
     /// Asks for the maps as the next frames have them.

@@ -20,8 +20,8 @@
 //!    have given way before, then, the coarsest first, those that never had what they wished for.
 //!
 //! What a surface is charged with is all that it may come to hold on the GPU by the effects that there are: so maps that are
-//! only made when the first drop falls cannot fail then. All of this is decided from the main world's state alone: the same
-//! with and without a renderer, and in the order in which surfaces were spawned.
+//! only made when the first drop falls cannot fail then. All of this is decided at the start of frames, from the main world's state
+//! alone: the same in runs of the same frames, with and without a renderer, and in the order in which surfaces were spawned.
 //!
 //! Maps take their new size when its texels are measured, some frames later. What is given up counts as taken until then, and so
 //! does what has been granted, so that the budget holds at all times.
@@ -43,7 +43,9 @@ use crate::effect::RefreshEffects;
 
 pub use loss::MapLoss;
 pub use plan::MapNeed;
-pub(crate) use resize::{can_put_size, put_first_size, put_size};
+pub(crate) use resize::{
+    can_put_size, can_resume_resizing, is_resizing, put_first_size, put_size, resizing_of, resume_resizing,
+};
 
 /// How much memory of the GPU the maps of all surfaces may take, and how fine they are. May be changed at any time: where
 /// it becomes too little, maps are halved, and taken away where that is not enough.

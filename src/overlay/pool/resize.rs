@@ -23,7 +23,8 @@ use crate::overlay::splat::{resized_length, resized_stamp};
 use crate::overlay::{CpuMaps, Lying, Overlays, SplatQueue, SurfaceFrames, TILE_SIZE, Weatherable, Wrap};
 use crate::weather::DryingClock;
 use crate::wetting::{
-    DropQueue, Exposure, MeasureTimer, Measured, Now, Shares, SurfaceWater, TexelGeometry, WetGeometry,
+    DropQueue, Exposure, MeasureTimer, MeasureTiming, Measured, Now, Shares, SurfaceWater, TexelGeometry,
+    WetGeometry,
 };
 
 /// A surface's way to maps of another size.
@@ -74,15 +75,21 @@ pub(super) fn resize_queues(
         drop.jet = drop.jet.map(|jet| jet.map(|length| resized_length(length, from, to)));
     }
     for deposit in deposits.into_iter().flat_map(|deposits| &mut deposits.0) {
-        (deposit.center, deposit.radius) = resized_stamp(deposit.center, deposit.radius, from, to);
         if let Some(stamp) = &mut deposit.stamp {
             (_, stamp.radius) = resized_stamp(deposit.center, stamp.radius, from, to);
         }
+        (deposit.center, deposit.radius) = resized_stamp(deposit.center, deposit.radius, from, to);
     }
 }
 
 type Resized = (
-    (Entity, &'static Weatherable, &'static mut MapSize, &'static mut Resizing, &'static SurfaceCollider),
+    (
+        Entity,
+        &'static Weatherable,
+        &'static mut MapSize,
+        &'static mut Resizing,
+        Option<&'static SurfaceCollider>,
+    ),
     (&'static mut SplatQueue, Option<&'static mut DropQueue>, Option<&'static mut MatterQueue>),
     (
         Option<(&'static mut SurfaceWater, &'static mut SurfaceMatter)>,
@@ -122,9 +129,10 @@ pub(super) fn finish_resizes(
         let Some((new, new_frames)) = timer.take(&mut resizing.task, asked_at) else { continue };
         commands.entity(entity).try_remove::<Resizing>();
         let (from, to) = (size.texels, resizing.to);
-        let is_the_same = Arc::ptr_eq(&resizing.bvh, &collider.0) && resizing.wrap == surface.wrap();
+        let is_the_same = collider.is_some_and(|collider| Arc::ptr_eq(&resizing.bvh, &collider.0))
+            && resizing.wrap == surface.wrap();
         let Some(mut geometry) = geometry.filter(|geometry| is_the_same && geometry.0.size() == from) else {
-            // It has got another shape meanwhile; whether its maps change is decided again.
+            // It has got another shape meanwhile, or is about to; whether its maps change is decided again.
             continue;
         };
         if let Some((water, matter)) = &mut contents
@@ -143,7 +151,10 @@ pub(super) fn finish_resizes(
             **matter = matter.resized(&Shares::new(from, &new));
             **water = water.resized(&geometry.0, &new);
         }
-        if let Some(mut exposure) = exposure {
+        if measured.as_ref().is_some_and(|measured| measured.is_of_new_shape()) {
+            // It is that of the shape before.
+            commands.entity(entity).try_remove::<Exposure>();
+        } else if let Some(mut exposure) = exposure {
             *exposure = exposure.resized(from, to);
         }
         let lying = maps.as_ref().and(frames.as_deref()).map(Lying::new);
@@ -186,6 +197,38 @@ pub(super) fn tell(size: &mut MapSize, from: u32, name: impl FnOnce() -> String)
 /// A surface that is not resized any more: it has no maps, or is none.
 pub(super) fn release_resizing(removed: On<Remove, MapSize>, mut commands: Commands) {
     commands.entity(removed.entity).try_remove::<Resizing>();
+}
+
+/// Whether any surface is on its way to maps of another size, and may get there while time stands still.
+pub(crate) fn is_resizing(world: &mut World) -> bool {
+    // Else it gets there at its tick.
+    let timing = world.get_resource::<MeasureTiming>().copied().unwrap_or_default();
+    timing == MeasureTiming::WhenReady && world.query::<&Resizing>().iter(world).next().is_some()
+}
+
+/// To how many texels along each side a surface is on its way, and since which tick.
+pub(crate) fn resizing_of(world: &World, surface: Entity) -> Option<(u32, u32)> {
+    world.get::<Resizing>(surface).map(|resizing| (resizing.to, resizing.asked_at))
+}
+
+/// Whether a surface may be on its way from maps of one size to those of another. `from`, `to`: texels along each side.
+pub(crate) fn can_resume_resizing(world: &World, surface: Entity, from: u32, to: u32) -> bool {
+    let limit = world.get::<MapSize>(surface).map_or(0, |size| size.limit);
+    let is_step = to != from && to <= 2 * from && is_reached(from, to);
+    is_step && to.is_multiple_of(TILE_SIZE) && to <= limit
+}
+
+/// Sends a surface on its way to maps of another size, as if it had been since a tick: for a scene that is put back as it was.
+pub(crate) fn resume_resizing(world: &mut World, surface: Entity, to: u32, since: u32) {
+    let Ok(mut entity) = world.get_entity_mut(surface) else { return };
+    let (Some(settings), Some(collider), Some(transform)) =
+        (entity.get::<Weatherable>(), entity.get::<SurfaceCollider>(), entity.get::<GlobalTransform>())
+    else {
+        return;
+    };
+    let in_space = entity.contains::<SurfaceFrames>();
+    let resizing = Resizing::begin(to, settings.wrap(), collider, transform, in_space, since);
+    entity.insert(resizing);
 }
 
 /// Whether [`put_size`] can give a surface maps with so many texels along each side.
@@ -258,22 +301,86 @@ pub(crate) fn put_first_size(world: &mut World, surface: Entity) {
 
 #[cfg(test)]
 mod tests {
+    use std::time::{Duration, Instant};
+
+    use bevy::math::Affine3A;
+
     use super::*;
+    use crate::collision::MeshTriangles;
     use crate::matter::{Deposit, DepositStamp, MatterKind};
 
     #[test]
-    fn matter_that_waits_and_its_stamp_are_as_large_on_other_maps() {
-        let rows = [[1024, 0], [0, 1024]];
-        let waits = Deposit {
-            center: [4096, 8192],
-            radius: [1536, 1024],
-            kind: MatterKind::Dust,
-            volume_nl: 7,
-            stamp: Some(DepositStamp { number: 3, radius: [2048, 1536], rows }),
-        };
-        let mut queue = MatterQueue(vec![waits]);
-        resize_queues(64, 32, &mut SplatQueue::default(), None, Some(&mut queue));
-        let stamp = Some(DepositStamp { number: 3, radius: [1024, 768], rows });
-        assert_eq!(queue.0, [Deposit { center: [2048, 4096], radius: [768, 512], stamp, ..waits }]);
+    fn matter_that_waits_is_as_large_and_at_the_same_place_on_other_maps_and_its_stamp_too() {
+        let stamp = DepositStamp { number: 3, radius: [1024, 768], rows: [[1024, 0], [0, 1024]] };
+        let (center, radius) = ([2048, 4096], [512; 2]);
+        let kind = MatterKind::Dust;
+        let deposit = Deposit { center, radius, kind, volume_nl: 7, stamp: Some(stamp) };
+        let mut deposits = MatterQueue(vec![deposit]);
+        resize_queues(64, 32, &mut SplatQueue::default(), None, Some(&mut deposits));
+        let stamp = Some(DepositStamp { radius: [512, 384], ..stamp });
+        assert_eq!(deposits.0, [Deposit { center: [1024, 2048], radius: [256; 2], stamp, ..deposit }]);
+    }
+
+    fn bvh() -> Arc<MeshBvh> {
+        let mesh = Mesh::from(Plane3d::new(Vec3::Y, Vec2::ONE));
+        Arc::new(MeshBvh::build(MeshTriangles::from_mesh(&mesh).unwrap()))
+    }
+
+    /// A dry surface on its way from 64 to 32 texels along each side.
+    fn resizing() -> (World, Entity) {
+        AsyncComputeTaskPool::get_or_init(Default::default);
+        let mut world = World::new();
+        world.init_resource::<MapPool>();
+        world.init_resource::<Messages<SurfaceResized>>();
+        let settings = Weatherable { map_size: 64, ..default() };
+        let (wrap, bvh) = (settings.wrap(), bvh());
+        let geometry = TexelGeometry::new(bvh.triangles(), &Affine3A::IDENTITY, Vec3::Y, 64, wrap);
+        let collider = SurfaceCollider(bvh);
+        let resizing = Resizing::begin(32, wrap, &collider, &GlobalTransform::IDENTITY, false, 0);
+        let maps = (settings, MapSize::whole(&settings), SplatQueue::default());
+        let surface = world.spawn((maps, WetGeometry(Arc::new(geometry)), collider, resizing)).id();
+        (world, surface)
+    }
+
+    /// Runs until it is resized no more. Texels along each side then, as they were granted and as they were measured, and how often
+    /// maps became smaller.
+    fn finished(world: &mut World, surface: Entity) -> (u32, u32, u64) {
+        let mut schedule = Schedule::default();
+        schedule.add_systems(finish_resizes);
+        let begun = Instant::now();
+        while world.get::<Resizing>(surface).is_some() {
+            assert!(begun.elapsed() < Duration::from_secs(30), "never done");
+            schedule.run(world);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let measured = world.get::<WetGeometry>(surface).unwrap().0.size();
+        (world.get::<MapSize>(surface).unwrap().texels(), measured, world.resource::<MapPool>().shrinks)
+    }
+
+    #[test]
+    fn a_surface_that_gets_another_mesh_meanwhile_keeps_its_maps_and_none_waits_for_it() {
+        let (mut world, surface) = resizing();
+        assert_eq!(finished(&mut world, surface), (32, 32, 1));
+        let (mut world, surface) = resizing();
+        world.entity_mut(surface).insert(SurfaceCollider(bvh()));
+        assert_eq!(finished(&mut world, surface), (64, 64, 0));
+        // It is not loaded yet, and may never be.
+        let (mut world, surface) = resizing();
+        world.entity_mut(surface).remove::<SurfaceCollider>();
+        assert_eq!(finished(&mut world, surface), (64, 64, 0));
+    }
+
+    #[test]
+    fn what_was_under_way_can_be_taken_up_again_if_it_leads_to_maps_that_there_may_be() {
+        let (mut world, surface) = resizing();
+        assert_eq!(resizing_of(&world, surface), Some((32, 0)));
+        world.entity_mut(surface).remove::<Resizing>();
+        assert_eq!(resizing_of(&world, surface), None);
+        let can = |from, to| can_resume_resizing(&world, surface, from, to);
+        assert!([(64, 32), (64, 16), (32, 64)].into_iter().all(|(from, to)| can(from, to)));
+        let others = [(64, 0), (0, 32), (64, 64), (64, 48), (32, 8), (16, 64), (64, 128)];
+        assert!(others.into_iter().all(|(from, to)| !can(from, to)));
+        resume_resizing(&mut world, surface, 32, 0);
+        assert_eq!(finished(&mut world, surface), (32, 32, 1));
     }
 }

@@ -46,6 +46,16 @@ impl Mapped {
         self.target.map_or(0, |target| self.bytes() - i128::from(self.need.bytes(target)))
     }
 
+    /// What becomes free after that, if it is halved as often as it can be once it is there.
+    fn left(&self) -> i128 {
+        let Some(target) = self.target else { return 0 };
+        let mut least = target;
+        while let Some(half) = self.half(least) {
+            least = half;
+        }
+        i128::from(self.need.bytes(target)) - i128::from(self.need.bytes(least))
+    }
+
     /// What half of a side is, if it may have that: whole tiles, and not less than the least.
     fn half(&self, side: u32) -> Option<u32> {
         (side.is_multiple_of(2 * TILE_SIZE) && side / 2 >= self.smallest).then_some(side / 2)
@@ -122,9 +132,10 @@ impl Room {
         self.free >= i128::from(bytes)
     }
 
-    /// Whether so many will be, if nobody else takes them.
+    /// Whether so many will be, if nobody else takes them: when what is on its way has come, and can be halved in its turn.
     pub(super) fn will_have(&self, bytes: u64) -> bool {
-        self.free + self.coming >= i128::from(bytes)
+        let left: i128 = self.mapped[self.gone..].iter().map(Mapped::left).sum();
+        self.free + self.coming + left >= i128::from(bytes)
     }
 
     /// They are taken.
@@ -310,9 +321,11 @@ mod tests {
     fn what_grows_is_charged_at_once_and_what_shrinks_until_it_has() {
         let grows = Mapped { target: Some(256), ..mapped(0, 1, 128) };
         let shrinks = Mapped { target: Some(64), ..mapped(1, 1, 128) };
-        let room = Room::new(NEED.bytes(256) + NEED.bytes(128), vec![grows, shrinks]);
+        let mut room = Room::new(NEED.bytes(256) + NEED.bytes(128), vec![grows, shrinks]);
         assert!(room.has(0) && !room.has(1));
-        let coming = NEED.bytes(128) - NEED.bytes(64);
+        // The larger one can be halved again, but not before it is there; until then nobody has to lose its maps.
+        let coming = NEED.bytes(128) - NEED.bytes(64) + NEED.bytes(256) - NEED.bytes(64);
         assert!(room.will_have(coming) && !room.will_have(coming + 1));
+        assert!(room.give_way(coming, u32::MAX).is_empty());
     }
 }

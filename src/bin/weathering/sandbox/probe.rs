@@ -80,11 +80,12 @@ fn read(
 ) {
     reading.0 = probed.0.and_then(|hit| {
         let (surface, water, geometry, matter) = surfaces.get(hit.surface).ok()?;
-        let size = surface.texels();
+        // Of the maps that it has: where the budget is short, they are smaller than it wishes for.
+        let size = water.size();
         let at = Splat::center_from_uv(hit.uv, size, surface.wrap()).map(|middle| (middle >> 8) as u32);
         let texel = at[1] * size + at[0];
         // Maps of another size are on their way.
-        if water.size() != size || geometry.0.size() != size {
+        if geometry.0.size() != size {
             return None;
         }
         let texel = geometry.0.stand_in(texel).unwrap_or(texel);
