@@ -10,7 +10,7 @@
 use std::f32::consts::TAU;
 
 use bevy::prelude::*;
-use bevy_weathering::collision::{LocalHit, MeshBvh, MeshTriangles};
+use bevy_weathering::collision::{MeshBvh, MeshTriangles};
 use image::RgbImage;
 
 use crate::seams::{Border, edges, is_seam};
@@ -39,6 +39,9 @@ const LEAST_FACING: f32 = 0.4;
 /// Where along an edge it is looked at, from the one end to the other.
 const PARTS: [f32; 3] = [0.25, 0.5, 0.75];
 
+/// How much nearer or farther the surface may be than a place, metres: beside a skewed triangle the place is a little off it.
+const SAME_DEPTH: f32 = 0.003;
+
 /// How much nearer or farther the surface may be a pixel away, metres: more is another part of it.
 const MOST_DEPTH: f32 = 0.012;
 
@@ -65,7 +68,6 @@ pub fn views(middle: Vec3) -> Vec<Transform> {
 
 /// An edge and the triangles on both sides of it.
 struct Edge {
-    triangles: [usize; 2],
     normals: [Vec3; 2],
     ends: [Vec3; 2],
     /// From the edge to where it is looked at, square to it, in the plane of each triangle.
@@ -86,7 +88,7 @@ impl Edge {
         });
         let far = (ASIDE * PIXEL).min(MOST_OF_HEIGHT * heights[0].length().min(heights[1].length()));
         let aside = heights.map(|height| height.normalize() * far);
-        Self { triangles: numbers, normals, ends, aside, is_seam: is_seam(sides) }
+        Self { normals, ends, aside, is_seam: is_seam(sides) }
     }
 
     /// Radians; 0 if both triangles lie in a plane.
@@ -130,7 +132,7 @@ impl Sight {
                 for part in PARTS {
                     let at = edge.ends[0].lerp(edge.ends[1], part);
                     let sides = edge.aside.map(|aside| at + aside);
-                    if (0..2).all(|side| is_shown(&mesh, eye, sides[side], edge.triangles[side])) {
+                    if sides.iter().all(|&side| is_shown(&mesh, eye, side)) {
                         let (edge_at, sides) = (pixel(eye, at), sides.map(|side| pixel(eye, side)));
                         let (fold, is_seam) = (edge.fold(), edge.is_seam);
                         glances.push(Glance { view, fold, is_seam, edge: edge_at, sides });
@@ -178,15 +180,15 @@ impl Sight {
     }
 }
 
-/// Whether an eye sees a triangle at a place of it, and nothing nearer or much farther a pixel beside that.
-fn is_shown(mesh: &MeshBvh, eye: &Transform, place: Vec3, triangle: usize) -> bool {
+/// Whether an eye sees the surface at a place of it, and nothing much nearer or farther a pixel beside that.
+fn is_shown(mesh: &MeshBvh, eye: &Transform, place: Vec3) -> bool {
     let (right, up, back) = (*eye.right() * PIXEL, *eye.up() * PIXEL, *eye.back() * DISTANCE);
-    let cast = |beside: Vec3| mesh.cast(place + beside + back, place + beside - back);
-    let is_beside = |hit: LocalHit| (2.0 * hit.fraction - 1.0).abs() * DISTANCE < MOST_DEPTH;
-    cast(Vec3::ZERO).is_some_and(|hit| hit.triangle as usize == triangle)
-        && [right + up, right - up, -right + up, -right - up]
-            .into_iter()
-            .all(|beside| cast(beside).is_some_and(is_beside))
+    let shows = |beside: Vec3, depth: f32| {
+        let hit = mesh.cast(place + beside + back, place + beside - back);
+        hit.is_some_and(|hit| (2.0 * hit.fraction - 1.0).abs() * DISTANCE < depth)
+    };
+    let corners = [right + up, right - up, -right + up, -right - up];
+    shows(Vec3::ZERO, SAME_DEPTH) && corners.into_iter().all(|beside| shows(beside, MOST_DEPTH))
 }
 
 /// Where in its picture an eye sees a place, pixels from the upper left corner.
