@@ -43,7 +43,7 @@ pub enum WeatheringSystems {
 
 /// The last step of [`WeatheringSystems::Trace`]: despawning what hit or expired.
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct RetireParticles;
+pub struct RetireSystems;
 
 /// Adds [`WeatheringTick`] and configures [`WeatheringSystems`].
 pub struct WeatheringSchedulePlugin;
@@ -55,7 +55,7 @@ impl Plugin for WeatheringSchedulePlugin {
             tick.set_executor(SingleThreadedExecutor::new());
         })
         .configure_sets(WeatheringTick, (First, Emit, Integrate, Trace, Deposit, Flow, Last).chain())
-        .configure_sets(WeatheringTick, RetireParticles.in_set(Trace))
+        .configure_sets(WeatheringTick, RetireSystems.in_set(Trace))
         .register_type::<TickHold>()
         .init_resource::<TickHold>()
         .add_systems(FixedUpdate, run_tick);

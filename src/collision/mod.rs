@@ -26,7 +26,7 @@ use bevy::prelude::*;
 
 use crate::effect::EffectIndex;
 use crate::particle::Sequence;
-use crate::schedule::{RetireParticles, WeatheringSystems, WeatheringTick};
+use crate::schedule::{RetireSystems, WeatheringSystems, WeatheringTick};
 
 pub(crate) use bvh::BoxOverlaps;
 pub use bvh::{LocalHit, MeshBvh};
@@ -75,7 +75,7 @@ pub struct Impacts(pub Vec<Impact>);
 
 /// In `PreUpdate`: meshes become colliders.
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct BuildColliders;
+pub struct ColliderSystems;
 
 /// Builds colliders and traces particles.
 pub struct CollisionPlugin;
@@ -98,7 +98,7 @@ impl Plugin for CollisionPlugin {
                     deform::attach_deforming,
                 )
                     .chain()
-                    .in_set(BuildColliders),
+                    .in_set(ColliderSystems),
             )
             .add_systems(PreUpdate, clearance::measure_clearance)
             .add_systems(
@@ -112,7 +112,7 @@ impl Plugin for CollisionPlugin {
                     .chain()
                     .in_set(WeatheringSystems::Trace)
                     // The dead are despawned when nobody needs them any more.
-                    .before(RetireParticles),
+                    .before(RetireSystems),
             );
     }
 }

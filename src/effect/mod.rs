@@ -211,7 +211,7 @@ impl Default for ParticleLook {
 
 /// In `PreUpdate`: the [`EffectTable`] follows its assets.
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct RefreshEffects;
+pub struct EffectSystems;
 
 /// Registers the asset, its loader, the effects that are built in, and the [`EffectTable`].
 pub struct EffectPlugin;
@@ -222,7 +222,7 @@ impl Plugin for EffectPlugin {
             .register_asset_loader(WeatherEffectLoader)
             .register_asset_reflect::<WeatherEffect>()
             .init_resource::<EffectTable>()
-            .add_systems(PreUpdate, table::refresh_effect_table.in_set(RefreshEffects));
+            .add_systems(PreUpdate, table::refresh_effect_table.in_set(EffectSystems));
         shipped::embed(app.world());
     }
 }

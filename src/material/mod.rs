@@ -38,7 +38,7 @@ use bevy::render::RenderApp;
 use bevy::shader::load_shader_library;
 
 use crate::overlay::deposit::note_traces;
-use crate::wetting::gpu::PackWater;
+use crate::wetting::gpu::WaterUploadSystems;
 
 pub use clock::{ClockBuffer, GpuDryingPoint};
 pub use exchange::DryMaterial;
@@ -94,7 +94,7 @@ impl Plugin for PorousMaterialPlugin {
                     // The first water is drawn in the frame in which it comes.
                     .after(note_traces)
                     // A surface that gets room for its water is bound to it at once.
-                    .after(PackWater)
+                    .after(WaterUploadSystems)
                     // What is added here is drawn in this frame.
                     .before(AssetEventSystems),
             );

@@ -6,17 +6,17 @@ use serde::{Deserialize, Serialize};
 use super::frames::{FramesWork, SurfaceFrames, measure_frames, release_frames};
 use super::site::Site;
 use super::stamping::{Mark, deposit_stamp, patch_radius, splat_from_impact, unit_hash};
-use super::{MapLoss, MapSize, SizeMaps, Splat, StampAtlas, StampSpace, TexelArea, Weatherable, pool};
+use super::{MapLoss, MapSize, MapSizeSystems, Splat, StampAtlas, StampSpace, TexelArea, Weatherable, pool};
 use crate::clock::WeatheringClock;
 use crate::collision::{DeformingCollider, Impact, Impacts, SurfaceCollider};
 use crate::effect::drops::{drop_mm3, splashes};
-use crate::effect::{Carries, EffectRow, EffectTable, RefreshEffects, WeatherEffect};
+use crate::effect::{Carries, EffectRow, EffectSystems, EffectTable, WeatherEffect};
 use crate::emitter::{NewParticles, Source};
 use crate::matter::wash::loosening_speed;
 use crate::matter::{Deposit, MatterKind, MatterQueue, SurfaceMatter};
 use crate::particle::{Lifespan, Particle, ParticleConfig, Particles};
 use crate::schedule::{WeatheringSystems, WeatheringTick};
-use crate::wetting::{Drop, DropQueue, MeasureSurfaces, SurfaceWater};
+use crate::wetting::{Drop, DropQueue, MeasureSystems, SurfaceWater};
 
 /// Splats of a surface that nobody has painted yet, in the order of their impacts. A frame may hold any number of
 /// ticks: each adds its own; the painter empties it.
@@ -93,7 +93,7 @@ pub struct SurfaceTotals {
 
 /// In `PreUpdate`, after surfaces have learnt their shape: stamps get their numbers, and surfaces learn where their texels lie.
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct PrepareStamps;
+pub struct StampSystems;
 
 /// Gives surfaces their queues and fills them.
 pub struct DepositPlugin;
@@ -113,12 +113,12 @@ impl Plugin for DepositPlugin {
             .add_observer(release_frames)
             .add_observer(release_texels)
             // Of maps whose size has been decided.
-            .add_systems(PreUpdate, measure_texels.after(SizeMaps))
+            .add_systems(PreUpdate, measure_texels.after(MapSizeSystems))
             .add_systems(
                 PreUpdate,
-                (number_stamps.after(RefreshEffects), measure_frames.after(MeasureSurfaces))
+                (number_stamps.after(EffectSystems), measure_frames.after(MeasureSystems))
                     .chain()
-                    .in_set(PrepareStamps),
+                    .in_set(StampSystems),
             )
             .add_systems(PostUpdate, note_traces)
             .add_systems(WeatheringTick, deposit_splats.in_set(WeatheringSystems::Deposit));

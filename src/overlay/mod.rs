@@ -40,7 +40,7 @@ pub use atlas::StampAtlas;
 pub use budget::SplatBudget;
 pub use cpu::{CpuMaps, CpuOverlayPlugin};
 pub(crate) use deposit::measure_texels;
-pub use deposit::{DepositPlugin, PrepareStamps, SplatQueue, SurfaceTotals, SurfaceTraces};
+pub use deposit::{DepositPlugin, SplatQueue, StampSystems, SurfaceTotals, SurfaceTraces};
 pub(crate) use frames::FramesWork;
 pub use frames::{SurfaceFrames, TexelFrame};
 pub use gpu::{GpuOverlayPlugin, MipStep, Overlays, SplatStats, SurfaceBatch};
@@ -48,7 +48,7 @@ pub(crate) use maps::Footprint;
 pub use maps::{RainRing, TexelArea, TexelAreas};
 pub use mips::{Lying, mip_chain, mip_levels};
 pub use pool::{
-    MapBudget, MapLoss, MapNeed, MapPool, MapSize, SizeMaps, SurfaceEvicted, SurfaceResized, Unmapped,
+    MapBudget, MapLoss, MapNeed, MapPool, MapSize, MapSizeSystems, SurfaceEvicted, SurfaceResized, Unmapped,
 };
 pub(crate) use pool::{
     can_put_size, can_resume_resizing, is_resizing, put_first_size, put_size, resizing_of, resume_resizing,

@@ -25,7 +25,7 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::EffectIndex;
-use crate::schedule::{RetireParticles, WeatheringSystems, WeatheringTick};
+use crate::schedule::{RetireSystems, WeatheringSystems, WeatheringTick};
 use crate::weather::Weather;
 
 pub use draw::{
@@ -177,7 +177,7 @@ impl Plugin for ParticlePlugin {
                 WeatheringTick,
                 (
                     integrate_particles.in_set(WeatheringSystems::Integrate),
-                    retire_particles.in_set(RetireParticles),
+                    retire_particles.in_set(RetireSystems),
                 ),
             );
     }

@@ -17,15 +17,15 @@ use super::scene_spawn::{AwaitedScene, fill_scenes, spawn_scenes};
 use super::timeline::{MaterialHandles, apply_events_plugin, camera_keys, emitter_motion, insert_events};
 use super::{Digest, LoadedScenario, MeshSpec, Scenario, ScenarioError};
 use crate::clock::ClockPlugin;
-use crate::collision::{BuildColliders, MeshColliders, NotWeatherable, SurfaceCollider};
-use crate::effect::{EffectTable, RefreshEffects, WeatherEffect};
+use crate::collision::{ColliderSystems, MeshColliders, NotWeatherable, SurfaceCollider};
+use crate::effect::{EffectSystems, EffectTable, WeatherEffect};
 use crate::emitter::{EmissionSeed, Emitter};
 use crate::material::{PlayedWetMap, Playing};
-use crate::overlay::{FramesWork, OverlayUv, PrepareStamps, TexelArea, Unmapped, Weatherable};
+use crate::overlay::{FramesWork, OverlayUv, StampSystems, TexelArea, Unmapped, Weatherable};
 use crate::particle::{Forces, ParticleConfig};
 use crate::save::{AddedEmitter, RemovedEmitter};
-use crate::unwrap::{NotUnwrapped, UnwrapMeshes};
-use crate::wetting::{self, ExposureProgress, MeasureProgress, MeasureSurfaces};
+use crate::unwrap::{NotUnwrapped, UnwrapSystems};
+use crate::wetting::{self, ExposureProgress, MeasureProgress, MeasureSystems};
 
 /// Spawns a scenario and runs it once everything is loaded. Virtual time stands still until then.
 ///
@@ -116,15 +116,15 @@ impl Plugin for ScenarioPlugin {
                 PreUpdate,
                 watch_loading
                     .run_if(is_loading)
-                    .after(BuildColliders)
-                    .after(MeasureSurfaces)
-                    .after(PrepareStamps),
+                    .after(ColliderSystems)
+                    .after(MeasureSystems)
+                    .after(StampSystems),
             )
-            .add_systems(PreUpdate, follow_effect_files.before(RefreshEffects))
+            .add_systems(PreUpdate, follow_effect_files.before(EffectSystems))
             // What they show is built in the same frame.
             .add_systems(
                 PreUpdate,
-                fill_scenes.run_if(is_loading).before(UnwrapMeshes).before(BuildColliders),
+                fill_scenes.run_if(is_loading).before(UnwrapSystems).before(ColliderSystems),
             )
             .add_systems(Update, move_camera);
         apply_events_plugin(app);

@@ -37,7 +37,7 @@ pub use error::UnwrapError;
 pub use jobs::Unwraps;
 pub use overlap::{UvOverlap, measure_overlap, shares_texels};
 
-use crate::collision::{AwaitsUvs, BuildColliders, UvSet};
+use crate::collision::{AwaitsUvs, ColliderSystems, UvSet};
 use crate::overlay::{OverlayUv, Weatherable};
 
 /// The mesh that this surface showed before it got an unwrapped copy.
@@ -56,7 +56,7 @@ type Wanting = (With<Weatherable>, Or<(Changed<Weatherable>, Changed<Mesh3d>)>);
 
 /// In `PreUpdate`, before colliders: meshes are looked at and unwrapped, and surfaces get their copies.
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct UnwrapMeshes;
+pub struct UnwrapSystems;
 
 /// Gives surfaces texture coordinates of their own. Without it all have those of their meshes.
 pub struct UnwrapPlugin;
@@ -70,9 +70,9 @@ impl Plugin for UnwrapPlugin {
                 PreUpdate,
                 (jobs::watch_meshes, jobs::run_unwraps, exchange::exchange_meshes)
                     .chain()
-                    .in_set(UnwrapMeshes)
+                    .in_set(UnwrapSystems)
                     // A surface is hit in the mesh that it shows from now on.
-                    .before(BuildColliders),
+                    .before(ColliderSystems),
             );
     }
 }

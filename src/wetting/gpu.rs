@@ -56,7 +56,7 @@ impl Plugin for WaterUploadPlugin {
         let stats = UploadStats::default();
         app.insert_resource(stats.clone()).add_observer(release_tiles).add_systems(
             PostUpdate,
-            pack_tiles.in_set(PackWater).after(crate::overlay::deposit::note_traces),
+            pack_tiles.in_set(WaterUploadSystems).after(crate::overlay::deposit::note_traces),
         );
         let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
         render_app
@@ -69,7 +69,7 @@ impl Plugin for WaterUploadPlugin {
 
 /// In `PostUpdate`: water is made ready to be drawn.
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct PackWater;
+pub struct WaterUploadSystems;
 
 /// What has been sent since the start; the same numbers in the main and in the render world.
 #[derive(Resource, Clone, Default)]

@@ -108,7 +108,7 @@ pub struct DropQueue(pub Vec<Drop>);
 
 /// In `PreUpdate`, after colliders: surfaces learn their shape, texel by texel.
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct MeasureSurfaces;
+pub struct MeasureSystems;
 
 /// Simulates water on surfaces. Needs no render app.
 pub struct WettingPlugin;
@@ -144,8 +144,8 @@ impl Plugin for WettingPlugin {
                     origin::ask_for_origins,
                 )
                     .chain()
-                    .in_set(MeasureSurfaces)
-                    .after(crate::collision::BuildColliders)
+                    .in_set(MeasureSystems)
+                    .after(crate::collision::ColliderSystems)
                     .after(crate::overlay::measure_texels),
             )
             .add_systems(

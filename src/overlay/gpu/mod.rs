@@ -26,7 +26,7 @@ use bevy::render::{ExtractSchedule, Render, RenderApp, RenderStartup, RenderSyst
 use bevy::shader::load_shader_library;
 
 use super::deposit::{deposit_splats, note_traces};
-use super::{SizeMaps, SplatBudget, SplatQueue};
+use super::{MapSizeSystems, SplatBudget, SplatQueue};
 use crate::schedule::{TickHold, WeatheringSystems, WeatheringTick};
 
 pub use maps::Overlays;
@@ -60,9 +60,11 @@ impl Plugin for GpuOverlayPlugin {
                 PreUpdate,
                 (
                     // Of maps whose size has been decided; what has waited since the last tick gets its room at once.
-                    (copies::forget_copies, maps::add_overlays, maps::open_overlays).chain().after(SizeMaps),
+                    (copies::forget_copies, maps::add_overlays, maps::open_overlays)
+                        .chain()
+                        .after(MapSizeSystems),
                     // What is taken away with its maps waits no more.
-                    hold::hold_ticks.after(SizeMaps),
+                    hold::hold_ticks.after(MapSizeSystems),
                 ),
             )
             .add_systems(

@@ -38,8 +38,8 @@ use bevy::prelude::*;
 use serde::Serialize;
 
 use super::{Weatherable, Wrap};
-use crate::collision::BuildColliders;
-use crate::effect::RefreshEffects;
+use crate::collision::ColliderSystems;
+use crate::effect::EffectSystems;
 
 pub use loss::MapLoss;
 pub use plan::MapNeed;
@@ -198,7 +198,7 @@ pub struct SurfaceResized {
 
 /// In `PreUpdate`, after colliders: surfaces get the size of their maps, or lose them.
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct SizeMaps;
+pub struct MapSizeSystems;
 
 pub(super) fn plugin(app: &mut App) {
     app.register_type::<MapBudget>()
@@ -219,16 +219,16 @@ pub(super) fn plugin(app: &mut App) {
             // What has become free is there for others at once.
             (resize::finish_resizes, size::size_surfaces)
                 .chain()
-                .in_set(SizeMaps)
+                .in_set(MapSizeSystems)
                 // By their area in the world.
-                .after(BuildColliders)
+                .after(ColliderSystems)
                 // By what may fall on them.
-                .after(RefreshEffects)
+                .after(EffectSystems)
                 // Which numbers the stamps of the same effects.
-                .before(super::PrepareStamps),
+                .before(super::StampSystems),
         )
         // Packing touches the water that is counted here.
-        .add_systems(PostUpdate, tally::tally.before(crate::wetting::gpu::PackWater));
+        .add_systems(PostUpdate, tally::tally.before(crate::wetting::gpu::WaterUploadSystems));
 }
 
 /// Spawn order, since that of entities and of queries says nothing.

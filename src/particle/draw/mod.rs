@@ -36,7 +36,7 @@ use crate::clock::WeatheringClock;
 use crate::collision::Impacts;
 use crate::effect::EffectTable;
 use crate::schedule::{WeatheringSystems, WeatheringTick};
-use crate::wetting::gpu::PackWater;
+use crate::wetting::gpu::WaterUploadSystems;
 
 use self::material::quads;
 use self::rows::{ParticleRows, splash_rows};
@@ -71,7 +71,7 @@ impl Plugin for ParticleDrawPlugin {
                 PostUpdate,
                 draw_particles
                     // Both add buffers.
-                    .after(PackWater)
+                    .after(WaterUploadSystems)
                     // What is hidden or shown here is so in this frame, and what grows is drawn in it.
                     .before(VisibilitySystems::VisibilityPropagate)
                     .before(AssetEventSystems),
