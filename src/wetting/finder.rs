@@ -182,8 +182,9 @@ impl<'a> Finder<'a> {
     }
 
     /// The owned texel nearest in space to a place on a triangle that owns no texel there: of those around a texel in the image, and
-    /// of those to which ways lead from the place, over seams, too. If none is near, one of the triangle's own.
-    pub(super) fn nearest_to(&self, place: &Place, around: u32) -> Option<u32> {
+    /// of those to which ways lead from the place, over seams, too. If none is near, one of the triangle's island.
+    /// `is_own`: whether a triangle is of that.
+    pub(super) fn nearest_to(&self, place: &Place, around: u32, is_own: impl Fn(u32) -> bool) -> Option<u32> {
         let point = self.surface.in_space(place);
         let distance = |texel: u32| {
             let other = self.place(texel).map(|other| self.surface.in_space(&other));
@@ -203,17 +204,21 @@ impl<'a> Finder<'a> {
         };
         let near = self.nearest(place, around, None).into_iter().chain(at_ends).filter(is_meant);
         near.min_by(|&one, &other| distance(one).total_cmp(&distance(other)))
-            .or_else(|| self.own_texel(place))
+            .or_else(|| self.own_texel(place, is_own))
     }
 
-    /// The first texel of a place's own triangle on the way from there to the triangle's middle.
-    fn own_texel(&self, place: &Place) -> Option<u32> {
+    /// The first texel of a place's own island on the way from there to the middle of its triangle. Else the one in which the middle of
+    /// the triangle's box lies, which is all that one has that covers no middle; if another of the island came first, it has it.
+    fn own_texel(&self, place: &Place, is_own: impl Fn(u32) -> bool) -> Option<u32> {
+        let [a, b, c] = self.surface.map[place.triangle as usize];
+        let middle_of_box = ((a.min(b).min(c) + a.max(b).max(c)) / 2.0).as_dvec2();
         let middle = Place { triangle: place.triangle, weights: [1.0 / 3.0; 3] };
         let [from, to] = [place, &middle].map(|place| self.surface.on_map(place));
         let steps = (from.distance(to) / SAMPLES_APART).ceil().max(1.0);
         (0..=steps as u32)
             .map(|step| self.grid.at(from.lerp(to, f64::from(step) / steps)))
-            .find(|&texel| self.owners.of(texel) == Some(place.triangle))
+            .chain([self.grid.at(middle_of_box)])
+            .find(|&texel| self.owners.of(texel).is_some_and(&is_own))
     }
 
     /// Whether a texel lies straight ahead of another in space, by as much as in the image.

@@ -140,13 +140,14 @@ impl Gutters {
         let (mut stand_ins, mut sources, mut tips) = (Vec::new(), Vec::new(), Vec::new());
         for Touched { texel, place, away } in touched(finder, is_beside) {
             let triangle = place.triangle;
+            let is_own = |owner: u32| islands[owner as usize] == islands[triangle as usize];
             let is_known = is_beside(texel, triangle);
             let shown = self.source(texel).and_then(|source| finder.owners.of(source));
-            let is_shown = shown.is_some_and(|owner| islands[owner as usize] == islands[triangle as usize]);
+            let is_shown = shown.is_some_and(is_own);
             if is_known && is_shown {
                 continue;
             }
-            let Some(other) = finder.nearest_to(&place, texel) else { continue };
+            let Some(other) = finder.nearest_to(&place, texel, is_own) else { continue };
             if !is_known {
                 stand_ins.push(StandIn { texel, other, triangle });
             }
