@@ -234,10 +234,10 @@ impl Sharing {
 mod tests {
     use super::super::geometry::TexelGeometry;
     use super::super::points::surface_points;
-    use super::super::test_meshes::turned_neighbours;
+    use super::super::test_meshes::{floor, joined, sheet, turned_neighbours};
     use super::*;
     use crate::overlay::Wrap;
-    use bevy::math::{Affine3A, Vec3};
+    use bevy::math::{Affine3A, Vec2, Vec3};
 
     const SIZE: u32 = 128;
     const WRAP: [Wrap; 2] = [Wrap::Clamp; 2];
@@ -281,6 +281,35 @@ mod tests {
         assert!(most < 1.25 && least > 0.75, "{most} {least}");
         // One by one it would not be so.
         assert!(most_by_one > 1.4 && least_by_one == 0.0, "{most_by_one} {least_by_one}");
+    }
+
+    #[test]
+    fn an_island_of_a_few_texels_gets_on_each_what_that_is_worth_over_the_edge_of_the_map_too() {
+        const AMOUNT: u64 = 1_000_003;
+        for (column, wrap) in [(90, WRAP), (127, [Wrap::Repeat; 2])] {
+            // Twelve columns and rows of the one on each of the other.
+            let first = sheet(4, floor, |point| (Vec2::new(4.3, 10.0) + point * 36.0) / 128.0);
+            let corner = Vec2::new(column as f32, 50.0);
+            let second =
+                sheet(4, |point| floor(point) + Vec3::X, move |point| (corner + point * 3.0) / 128.0);
+            let mesh = joined([first, second]);
+            let geometry = TexelGeometry::new(&mesh, &Affine3A::IDENTITY, Vec3::Y, SIZE, wrap);
+            let mut got = vec![0u64; (SIZE * SIZE) as usize];
+            for over in (10..46).flat_map(|row| (40..54).map(move |column| row * SIZE + column)) {
+                let landing = geometry.landing(Some(0), over, 28 * SIZE + 39).unwrap();
+                landing.share(AMOUNT, |texel, part| {
+                    assert!(geometry.owner(texel).is_some_and(|owner| owner >= 32), "{over} {texel}");
+                    got[texel as usize] += part;
+                });
+            }
+            assert_eq!(got.iter().sum::<u64>(), AMOUNT * 36 * 14);
+            for row in 50..53 {
+                let [near, next] =
+                    [column, (column + 1) % SIZE].map(|column| got[(row * SIZE + column) as usize]);
+                assert!((143 * AMOUNT..148 * AMOUNT).contains(&near), "{column} {row}: {near}");
+                assert!(next > 19 * AMOUNT, "{column} {row}: {next}");
+            }
+        }
     }
 
     #[test]
