@@ -123,7 +123,8 @@ impl TexelGeometry {
     /// The texel that stands for the surface at this one: itself if a triangle owns it; else, up to 8 texels
     /// off an island (columns plus rows), the one that a way over the mesh straight across the island's
     /// border leads to. Where the mesh ends at that border, the texel of the border. None further out, but for texels
-    /// that bilinear filtering of a triangle reads: those have the nearest one on the mesh.
+    /// that bilinear filtering of a triangle reads: those have the nearest one on the mesh or, if none is near, one of the
+    /// island's.
     pub fn stand_in(&self, texel: u32) -> Option<u32> {
         match self.layout.owner[texel as usize] {
             NOBODY => None,
@@ -198,7 +199,7 @@ impl TexelGeometry {
 
     /// For a texel that nobody owns but that lies within 2 columns and 2 rows of one that somebody does: the
     /// nearest such texel in the image. For one that bilinear filtering reads from a triangle whose island has none so near: the nearest
-    /// on the mesh. None for all others.
+    /// on the mesh or, if none is near, one of the island's. None for all others.
     pub fn gutter_source(&self, texel: u32) -> Option<u32> {
         self.layout.gutters.source(texel)
     }
