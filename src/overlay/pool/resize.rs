@@ -337,7 +337,7 @@ mod tests {
         let geometry = TexelGeometry::new(bvh.triangles(), &Affine3A::IDENTITY, Vec3::Y, 64, wrap);
         let collider = SurfaceCollider(bvh);
         let resizing = Resizing::begin(32, wrap, &collider, &GlobalTransform::IDENTITY, false, 0);
-        let maps = (settings, MapSize::whole(&settings), SplatQueue::default());
+        let maps = (settings, MapSize::whole(&settings), SplatQueue::default(), GlobalTransform::IDENTITY);
         let surface = world.spawn((maps, WetGeometry(Arc::new(geometry)), collider, resizing)).id();
         (world, surface)
     }
