@@ -32,7 +32,7 @@ const MOST_PAINTED: Differences =
 /// The same under water. Texels on either side of a border between turned islands lie askew to each other, and each holds an amount
 /// of its own: that is in `line`.
 const MOST_WET: Differences =
-    Differences { apart: Measure { mean: 2.5, high: 8.0 }, line: Measure { mean: 4.0, high: 12.0 } };
+    Differences { apart: Measure { mean: 2.0, high: 6.0 }, line: Measure { mean: 2.0, high: 6.0 } };
 
 /// A seam that is there on purpose differs by so many times as much as one may.
 const FOUND: f32 = 2.0;
