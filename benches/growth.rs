@@ -100,12 +100,12 @@ fn grown_since(before: Option<u64>) -> Option<f64> {
 }
 
 fn print_case(series: &str, count: usize, sim: &Sim, grown: Option<f64>, (alive, micros): (usize, f64)) {
-    let Readiness { hit, wetted, clear } = sim.readiness();
-    let [hit, wetted, clear] = [hit, wetted, clear].map(|time| time.as_secs_f64());
+    let Readiness { hit, wetted } = sim.readiness();
+    let [hit, wetted] = [hit, wetted].map(|time| time.as_secs_f64());
     let grown = grown.map_or("n/a".to_owned(), |bytes| format!("{:.0}", bytes * 1e-6));
     println!(
         "growth/{series}: {count:>9} | {alive:>8} alive | {micros:>10.1} us a tick | BVH after {hit:.2} s, texels after \
-         {wetted:.2} s, clearance after {clear:.2} s | {grown} MB"
+         {wetted:.2} s | {grown} MB"
     );
 }
 

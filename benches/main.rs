@@ -7,7 +7,6 @@
 //! | [`live`] | the highest emission that leaves a 60 Hz tick inside its 16.67 ms | the budget |
 //! | [`far`] | a particle with nothing near it | a loop over two arrays |
 //! | [`cast`] | closest hits of short segments, from 1,000 to 1,000,000 triangles | [`hoff`]; parry3d, bvh and `MeshRayCast`, in [`rivals`] |
-//! | [`clearance`] | casts and ticks with the grid of clearances | the same without |
 //! | [`growth`] | a tick by triangles, by surfaces and by particles | - |
 //! | [`shading`] | a frame full of a weathered surface | the same frame of a `StandardMaterial` |
 //! | [`wetting`] | water that runs, and surfaces at rest | a tick without surfaces |
@@ -22,7 +21,6 @@
 
 mod bytes;
 mod cast;
-mod clearance;
 mod drawing;
 mod far;
 mod glb;
@@ -65,7 +63,7 @@ criterion_group! {
     config = config();
     // Memory first, while nothing has been given back to the allocator that it could hand out again.
     targets = bytes::bench, baseline_is_right, tick::bench, live::bench, far::bench, cast::bench,
-        clearance::bench, splat::bench, wetting::bench, growth::bench, shading::bench, overlap::bench,
+        splat::bench, wetting::bench, growth::bench, shading::bench, overlap::bench,
         drawing::bench
 }
 criterion_main!(benches);

@@ -5,7 +5,7 @@
 //! and get the same emission.
 //!
 //! A simulation is handed out when all that is worked out in the background is there: colliders, the shape and the exposure
-//! of texels, and the clearance of the scene. Nothing of it runs beside what is timed.
+//! of texels. Nothing of it runs beside what is timed.
 
 use std::time::{Duration, Instant};
 
@@ -29,9 +29,6 @@ use crate::scene::{HZ, LIFETIME, Placed, Scene};
 
 /// Ticks after which nobody is in flight who was there at the start: as many die as are born.
 const STEADY_TICKS: u32 = 3 * HZ;
-
-/// Frames after which a scene that keeps still is taken to keep still by all that wait for it.
-const STILL_FRAMES: u32 = 64;
 
 /// Colliders are built in milliseconds, of ten million triangles in seconds; this long means that they never will be.
 const PATIENCE: Duration = Duration::from_secs(240);
@@ -65,8 +62,6 @@ pub struct Readiness {
     pub hit: Duration,
     /// Until all knew the shape and exposure of their texels.
     pub wetted: Duration,
-    /// Until the clearance of the scene was known, too.
-    pub clear: Duration,
 }
 
 /// A scene in a headless app.
@@ -205,11 +200,6 @@ impl Sim {
         self.readiness
     }
 
-    /// For benches that look into it.
-    pub fn world(&self) -> &World {
-        self.app.world()
-    }
-
     /// For benches that put particles where they want them.
     pub fn world_mut(&mut self) -> &mut World {
         self.app.world_mut()
@@ -263,15 +253,11 @@ fn wait_for_surfaces(app: &mut App) -> Readiness {
     let wetted = begun.elapsed();
     app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
     app.update();
-    app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
-    for _ in 0..STILL_FRAMES {
-        app.update();
-    }
     // One thread does such work, in the order it was asked for: when this is done, so is all the rest. The next frame
     // collects it.
     block_on(AsyncComputeTaskPool::get().spawn(async {}));
+    app.insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
     app.update();
-    let clear = begun.elapsed();
     app.insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
-    Readiness { hit, wetted, clear }
+    Readiness { hit, wetted }
 }

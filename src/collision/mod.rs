@@ -14,7 +14,6 @@
 //! [`Sequence`]: crate::particle::Sequence
 
 mod bvh;
-mod clearance;
 mod colliders;
 mod deform;
 mod scene;
@@ -100,7 +99,6 @@ impl Plugin for CollisionPlugin {
                     .chain()
                     .in_set(ColliderSystems),
             )
-            .add_systems(PreUpdate, clearance::measure_clearance)
             .add_systems(
                 WeatheringTick,
                 (

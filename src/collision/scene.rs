@@ -6,7 +6,6 @@ use bevy::math::{Affine3A, Vec3A};
 use bevy::prelude::*;
 
 use super::bvh::{BoxBvh, Segment};
-use super::clearance::Clearance;
 use super::triangles::FARTHEST;
 use super::{DeformingCollider, LocalHit, Shape, SurfaceCollider};
 
@@ -15,8 +14,6 @@ use super::{DeformingCollider, LocalHit, Shape, SurfaceCollider};
 pub struct CollisionScene {
     rigid: Part,
     deforming: Part,
-    /// Of the rigid part.
-    clearance: Option<Clearance>,
 }
 
 /// Some of the surfaces, under one BVH.
@@ -64,7 +61,7 @@ impl CollisionScene {
         let surfaces = surfaces.into_iter().map(|(surface, at, shape)| (surface, at, shape.into()));
         let (deforming, rigid): (Vec<_>, Vec<_>) =
             surfaces.partition(|(.., shape)| matches!(shape, Shape::Deforming(_)));
-        Self { rigid: Part::new(rigid), deforming: Part::new(deforming), clearance: None }
+        Self { rigid: Part::new(rigid), deforming: Part::new(deforming) }
     }
 
     /// Number of surfaces.
@@ -88,34 +85,12 @@ impl CollisionScene {
     pub fn cast(&self, start: Vec3, end: Vec3) -> Option<SceneHit> {
         // Most particles are in the air: this is all they cost.
         let (from, to) = (Vec3A::from(start), Vec3A::from(end));
-        let is_clear = || self.clearance.as_ref().is_some_and(|clearance| clearance.is_clear(from, to));
-        let rigid = segment_near_box(from, to, self.rigid.bounds) && !is_clear();
+        let rigid = segment_near_box(from, to, self.rigid.bounds);
         let deforming = segment_near_box(from, to, self.deforming.bounds);
         if !(rigid || deforming) {
             return None;
         }
         self.cast_near(start, end, rigid, deforming)
-    }
-
-    /// Work that tells how far off everything rigid is: nothing, for a scene that knows or has nothing.
-    pub(super) fn clearance_work(&self) -> Option<impl FnOnce() -> Option<Clearance> + Send + 'static> {
-        if self.rigid.instances.is_empty() || self.clearance.is_some() {
-            return None;
-        }
-        let (instances, bounds) = (self.rigid.instances.clone(), self.rigid.bounds);
-        Some(move || {
-            let triangles = instances.iter().flat_map(|instance| {
-                let to_world = |corner| instance.world_from_mesh.transform_point3(corner);
-                let triangles = &instance.shape.triangles().positions;
-                triangles.iter().map(move |corners| corners.map(to_world))
-            });
-            Clearance::new(bounds, triangles)
-        })
-    }
-
-    /// What has been worked out for exactly these rigid surfaces.
-    pub(super) fn set_clearance(&mut self, clearance: Option<Clearance>) {
-        self.clearance = clearance;
     }
 
     /// Lets go of the surfaces that deform, so that their shapes can change in place.
@@ -280,7 +255,7 @@ pub(super) fn update_collision_scene(
             })
             .collect();
         surfaces.sort_unstable_by_key(|(entity, ..)| *entity);
-        (scene.rigid, scene.clearance) = (Part::new(surfaces), None);
+        scene.rigid = Part::new(surfaces);
     }
     if others || !deformed.is_empty() {
         let placed = |(entity, transform, collider): (Entity, &GlobalTransform, &DeformingCollider)| {
