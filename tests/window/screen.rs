@@ -202,9 +202,9 @@ impl Scenery {
         fs::write(file, settings).unwrap();
     }
 
-    /// What the program remembers for another time.
+    /// What the program remembers for another time; nothing if it has changed nothing.
     pub fn remembered(&self) -> String {
-        fs::read_to_string(self.settings()).unwrap()
+        fs::read_to_string(self.settings()).unwrap_or_default()
     }
 
     /// What the program said since it was started last.

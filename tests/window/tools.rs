@@ -88,7 +88,11 @@ fn maps_and_the_probe_tell_of_a_stroke_and_of_a_jet_and_the_stroke_is_taken_back
     // One step back is all that there is.
     sandbox.answer("took a stroke back", |sandbox| sandbox.key("ctrl+z"));
     let taken_back = probe(&mut sandbox);
-    assert!(taken_back.contains("never wet") && !taken_back.contains("water from"), "{taken_back}");
+    assert!(
+        taken_back.contains("never wet") && !taken_back.contains("water from"),
+        "{painted}\n{taken_back}\n{}",
+        scenery.log()
+    );
     assert_eq!(water(&taken_back), 0.0, "{taken_back}");
     sandbox.answer("nothing to take back", |sandbox| sandbox.key("ctrl+z"));
 

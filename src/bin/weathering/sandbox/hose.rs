@@ -49,10 +49,14 @@ fn point(
     cameras: Query<(&Camera, &GlobalTransform), With<View>>,
     mut pointed: ResMut<Pointed>,
 ) {
-    pointed.pressed = buttons.just_pressed(MouseButton::Left) && !input.pointer;
+    let window = window.single().ok();
+    // It may have moved onto a panel in the very frame in which the button was pressed.
+    let at = window.and_then(Window::physical_cursor_position);
+    let is_outside = at.zip(input.free).is_some_and(|(at, free)| !free.contains(at));
+    pointed.pressed = buttons.just_pressed(MouseButton::Left) && !input.pointer && !is_outside;
     // A click within one slow frame is seen pressed and let go of, and counts for that frame.
     pointed.held = pointed.pressed || (pointed.held && buttons.pressed(MouseButton::Left));
-    let cursor = window.single().ok().and_then(Window::cursor_position);
+    let cursor = window.and_then(Window::cursor_position);
     pointed.ray = cursor.zip(cameras.iter().next()).and_then(|(cursor, (camera, transform))| {
         // The part of the window that is another camera's is not pointed at.
         if !camera.logical_viewport_rect().is_some_and(|rect| rect.contains(cursor)) {
@@ -240,6 +244,24 @@ mod tests {
         assert!(!is_held(true, click));
         assert!(!is_held(true, |buttons| buttons.press(MouseButton::Left)));
         assert!(!is_held(false, |_| {}));
+        // Fast onto a panel and clicked there, before the panels know.
+        let mut world = World::new();
+        world.init_resource::<Pointed>();
+        world.insert_resource(UiInput { free: Some(Rect::new(300.0, 40.0, 960.0, 540.0)), ..default() });
+        let mut buttons = ButtonInput::<MouseButton>::default();
+        buttons.press(MouseButton::Left);
+        world.insert_resource(buttons);
+        let mut window = Window::default();
+        window.resolution.set_physical_resolution(960, 540);
+        let window = world.spawn((window, PrimaryWindow)).id();
+        let mut is_held = |x: f64| {
+            let at = Some(bevy::math::DVec2::new(x, 100.0));
+            world.get_mut::<Window>(window).unwrap().set_physical_cursor_position(at);
+            world.run_system_cached(point).unwrap();
+            world.resource::<Pointed>().held
+        };
+        assert!(!is_held(200.0));
+        assert!(is_held(400.0));
     }
 
     #[test]

@@ -51,10 +51,7 @@ pub struct SecondCamera;
 
 pub fn plugin(app: &mut App) {
     app.add_systems(PreUpdate, follow_emitters.run_if(resource_exists::<Split>))
-        .add_systems(
-            PostUpdate,
-            (divide, follow_camera).run_if(resource_exists::<Split>).before(TransformSystems::Propagate),
-        )
+        .add_systems(PostUpdate, (divide, follow_camera).before(TransformSystems::Propagate))
         .add_systems(
             PostUpdate,
             // Where everything is in this frame.
@@ -170,7 +167,8 @@ fn follow_emitters(
 
 /// Gives each camera its part of the window.
 fn divide(
-    split: Res<Split>,
+    // Not a condition of both systems: panels may end the comparison between it and the second one.
+    split: If<Res<Split>>,
     window: Query<&Window, With<PrimaryWindow>>,
     mut first: Query<&mut Camera, (With<View>, Without<SecondCamera>)>,
     mut second: Query<&mut Camera, With<SecondCamera>>,
@@ -207,7 +205,7 @@ fn viewports(size: UVec2, at: f32) -> [Viewport; 2] {
 }
 
 fn follow_camera(
-    split: Res<Split>,
+    split: If<Res<Split>>,
     first: Query<&Transform, (With<View>, Without<SecondCamera>)>,
     mut second: Query<&mut Transform, With<SecondCamera>>,
 ) {

@@ -57,6 +57,8 @@ impl AddPanel for App {
 pub struct UiInput {
     /// The pointer is over a panel, or drags something of it.
     pub pointer: bool,
+    /// What panels leave of the window, physical pixels, if that is known. The pointer may have come out of it since.
+    pub free: Option<Rect>,
     /// A text is being edited.
     pub keyboard: bool,
     /// A list or the like is open in front, which Escape closes.
@@ -195,7 +197,9 @@ fn draw(world: &mut World, mut is_dressed: Local<bool>) {
         world.resource_mut::<Help>().0 = help;
     }
     let outside = context.pointer_latest_pos().is_some_and(|at| !free.contains(at));
+    let corner = |at: egui::Pos2| Vec2::new(at.x, at.y) * context.pixels_per_point();
     let mut input = world.resource_mut::<UiInput>();
+    input.free = Some(Rect::from_corners(corner(free.min), corner(free.max)));
     input.popup = context.any_popup_open();
     input.pointer =
         outside || context.egui_is_using_pointer() || input.popup || context.is_pointer_over_egui();
