@@ -43,7 +43,7 @@ fail() {
 }
 
 # A white screen. The server keeps what is on it in a file: a header of big-endian words, colours, pixels of four bytes.
-Xvfb -displayfd 3 -screen 0 1280x720x24 -wr -fbdir "${scratch}" 3>"${scratch}/display" 2>/dev/null &
+Xvfb -noreset -displayfd 3 -screen 0 1280x720x24 -wr -fbdir "${scratch}" 3>"${scratch}/display" 2>/dev/null &
 screen_pid=$!
 for _ in $(seq 100); do [ ! -s "${scratch}/display" ] || break; sleep 0.1; done
 [ -s "${scratch}/display" ] || fail "Xvfb does not start"

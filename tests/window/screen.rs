@@ -61,7 +61,8 @@ impl Screen {
         let memory = tempfile::tempdir().unwrap();
         let mut server = Command::new("Xvfb");
         server
-            .args(["-displayfd", "1", "-screen", "0", "1280x720x24", "-wr", "-fbdir"])
+            // Without a reset: it takes nobody on while it starts over, as it does when the last one leaves.
+            .args(["-noreset", "-displayfd", "1", "-screen", "0", "1280x720x24", "-wr", "-fbdir"])
             .arg(memory.path())
             .stdout(Stdio::piped())
             .stderr(Stdio::null());

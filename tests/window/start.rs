@@ -4,7 +4,7 @@ use std::fs;
 use std::time::{Duration, Instant};
 
 use super::keys::SCENARIO;
-use super::screen::{Sandbox, Scenery, Screen};
+use super::screen::{Sandbox, Scenery, Screen, wait_for};
 
 #[test]
 fn the_window_appears_with_its_first_picture_and_effects_follow_their_files() {
@@ -14,6 +14,7 @@ fn the_window_appears_with_its_first_picture_and_effects_follow_their_files() {
     let begun = Instant::now();
     let (mut sandbox, seen) = screen.watch(|| {
         let sandbox = Sandbox::start(&screen, &scenery);
+        wait_for("the first picture", || (screen.shares().white < 0.8).then_some(()));
         std::thread::sleep(Duration::from_secs(1));
         sandbox
     });
