@@ -80,6 +80,11 @@ impl CollisionScene {
         (low.min(other_low), high.max(other_high))
     }
 
+    /// Few boxes that together hold everything that can be hit: the surfaces', if there are few.
+    pub(super) fn first_boxes(&self) -> impl Iterator<Item = (Vec3, Vec3)> {
+        self.rigid.top.first_boxes().chain(self.deforming.top.first_boxes())
+    }
+
     /// The closest hit on the segment from `start` to `end`, seen from either side.
     #[inline]
     pub fn cast(&self, start: Vec3, end: Vec3) -> Option<SceneHit> {

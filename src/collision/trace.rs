@@ -6,7 +6,7 @@ use bevy::utils::Parallel;
 use super::{CollisionScene, Impact, Impacts};
 use crate::clock::WeatheringClock;
 use crate::particle::{
-    BoxRows, Lifespan, Particles, ROW, chunk_len, for_each_chunk, swept_seconds, swept_start,
+    BoxRows, Lifespan, Particles, ROW, WayRows, chunk_len, for_each_chunk, swept_seconds, swept_start,
 };
 
 /// Below this many particles one thread is faster than waking others.
@@ -27,6 +27,7 @@ pub(super) fn trace_particles(
     scene: Res<CollisionScene>,
     mut impacts: ResMut<Impacts>,
     mut per_thread: Local<Parallel<Vec<Impact>>>,
+    mut boxes: Local<Vec<BoxRows>>,
     mut particles: ResMut<Particles>,
 ) {
     impacts.0.clear();
@@ -41,7 +42,9 @@ pub(super) fn trace_particles(
         particles;
     let len = chunk_len(positions.len(), PARALLEL_BATCH);
     let chunks = lifespans.chunks_mut(len).enumerate();
-    let (scene, per_thread_found) = (&*scene, &*per_thread);
+    boxes.clear();
+    boxes.extend(scene.first_boxes().map(BoxRows::new));
+    let (scene, per_thread_found, boxes) = (&*scene, &*per_thread, &**boxes);
     let reach = BoxRows::new(scene.bounds());
     for_each_chunk(chunks, |(chunk, lifespans)| {
         let mut found = per_thread_found.borrow_local_mut();
@@ -75,8 +78,12 @@ pub(super) fn trace_particles(
         for (index, ((ends, velocities), lifespans)) in
             here.step_by(ROW).zip(ends.0.iter().zip(velocities.0).zip(rows))
         {
-            // Most are far from everything: this is all they cost. The newborn have come less far.
-            let touched = reach.touched(ends, velocities, longest);
+            // Most are far from everything, or between the surfaces: this is all they cost. The newborn have come less far.
+            let ways = WayRows::new(ends, velocities, longest);
+            let mut touched = reach.touched(&ways);
+            if touched != 0 {
+                touched &= boxes.iter().fold(0, |any, near| any | near.touched(&ways));
+            }
             if touched != 0 {
                 for (lane, lifespan) in lifespans.iter_mut().enumerate() {
                     if touched >> (3 * lane) & 1 == 1 {

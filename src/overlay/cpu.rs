@@ -48,7 +48,7 @@ impl CpuMaps {
 
     /// Paints splats, one after the other. `frames`: where the texels lie; without them, splats in space are left out.
     pub fn paint(&mut self, splats: &[Splat], stamps: &StampAtlas, frames: Option<&SurfaceFrames>) {
-        for splat in splats {
+        for splat in splats.iter().filter(|splat| splat.paints()) {
             if splat.in_space == 0 {
                 self.paint_on_map(splat, stamps);
             } else if let Some(frames) = frames {

@@ -18,8 +18,8 @@ use crate::particle::{Lifespan, Particle, ParticleConfig, Particles};
 use crate::schedule::{WeatheringSystems, WeatheringTick};
 use crate::wetting::{Drop, DropQueue, MeasureSystems, SurfaceWater};
 
-/// Splats of a surface that nobody has painted yet, in the order of their impacts. A frame may hold any number of
-/// ticks: each adds its own; the painter empties it.
+/// Splats of a surface that nobody has painted yet, in the order of their impacts: of all that leave a mark or bring water. A frame
+/// may hold any number of ticks: each adds its own; the painter empties it.
 #[derive(Component, Debug, Default)]
 pub struct SplatQueue {
     splats: Vec<Splat>,
@@ -48,7 +48,7 @@ impl SplatQueue {
 
     /// Adds a splat behind the others.
     pub fn push(&mut self, splat: Splat) {
-        self.traces.paint |= splat.diffuse >> 24 > 0 || splat.specular >> 24 > 0 || splat.bump_opacity > 0;
+        self.traces.paint |= splat.paints();
         self.splats.push(splat);
     }
 
@@ -60,6 +60,11 @@ impl SplatQueue {
     /// Whether nothing waits.
     pub fn is_empty(&self) -> bool {
         self.splats.is_empty()
+    }
+
+    /// Whether any that was pushed left colour, gloss or relief.
+    pub fn has_painted(&self) -> bool {
+        self.traces.paint
     }
 
     /// Forgets the splats, keeping the memory.
@@ -149,7 +154,7 @@ fn release_texels(removed: On<Remove, MapSize>, mut commands: Commands) {
 pub(crate) fn note_traces(
     mut surfaces: Query<
         (&SplatQueue, Option<&SurfaceWater>, Option<&SurfaceMatter>, &mut SurfaceTraces),
-        Or<(Changed<SplatQueue>, Changed<SurfaceWater>)>,
+        Or<(Changed<SplatQueue>, Changed<SurfaceWater>, Changed<SurfaceMatter>)>,
     >,
 ) {
     for (queue, water, matter, mut traces) in &mut surfaces {
@@ -208,11 +213,14 @@ pub(super) fn deposit_splats(
         let map = (size.texels(), surface.wrap());
         let site = frames
             .zip(transform)
+            .filter(|_| effect.paints())
             .and_then(|(frames, transform)| Site::of(impact, &frames.0, transform, deforming));
         let mark = Mark::of(impact, row, effect);
         let splat =
             splat_from_impact(impact, row, effect, mark, map, site.as_ref(), (clock.tick(), water_nl));
-        queue.push(splat);
+        if splat.paints() || water_nl > 0 {
+            queue.push(splat);
+        }
         let (center, radius) = (splat.center, patch_radius(impact, mark, size.texels()));
         if let Some(mut matter) = matter
             && let Some(kind) = kind_of(effect.carries)

@@ -69,6 +69,11 @@ impl Splat {
         [axis(uv.x, wrap[0]), axis(uv.y, wrap[1])]
     }
 
+    /// Whether it leaves colour, gloss or relief. What does not is a drop whose place is remembered for the ring around it.
+    pub fn paints(&self) -> bool {
+        self.diffuse >> 24 > 0 || self.specular >> 24 > 0 || self.bump_opacity > 0
+    }
+
     /// Itself on a map of another size, where it is as large and at the same place. `from`, `to`: texels along each side.
     pub(crate) fn resized(self, from: u32, to: u32) -> Self {
         let (center, radius) = resized_stamp(self.center, self.radius, from, to);

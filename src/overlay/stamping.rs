@@ -167,19 +167,20 @@ pub(super) fn splat_from_impact(
         bump_opacity: if effect.bump == 0.0 { 0 } else { 255 },
         ..Zeroable::zeroed()
     };
-    // Without paint any shape will do, and the plainest is the fastest.
-    if effect.paints() {
-        splat.stamp = stamp_number(impact, row, splat.radius, stretch).unwrap_or(0);
+    // Without paint it has no shape: it is only a place where a drop has fallen.
+    if !effect.paints() {
+        return splat;
     }
+    splat.stamp = stamp_number(impact, row, splat.radius, stretch).unwrap_or(0);
     let axes = Axes::new(impact, effect.stamp_turn, front(impact));
     let [s, t] = axes.drawn_out(impact, stretch);
     match site {
-        Some(site) if effect.paints() => {
+        Some(site) => {
             // Never so small that it falls between texels.
             let pitch = 1.0 / (impact.uv_per_metre.min_element() * size as f32).max(1e-6);
             lay_in_space(&mut splat, site, [s, t, axes.n], &axes, long.max(0.75 * pitch));
         }
-        _ => {
+        None => {
             let row = |axis: Vec3| {
                 let [along_u, along_v] = row_on_map(axis, impact);
                 [along_u, along_v, 0]

@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use super::frames::SurfaceFrames;
+use super::kernel::SUBTEXELS;
 use super::{Splat, Wrap};
 
 /// Texels along each side of a tile: one workgroup.
@@ -35,9 +36,9 @@ pub struct TileBins {
 
 impl TileBins {
     /// Appends the tiles of one surface that its first splats touch to `headers`, and those splats to `list`, as numbers from
-    /// `first_splat` on: one splat, and as many more as begin within so many [bytes](Self::bytes). Returns how many. `frames`:
-    /// where the texels lie; without them, splats in space touch nothing. Tiles come in ascending order, splats within a tile
-    /// in theirs.
+    /// `first_splat` on: one splat, and as many more as begin within so many [bytes](Self::bytes). Returns how many. What paints
+    /// nothing touches the tile on which it fell. `frames`: where the texels lie; without them, splats in space touch nothing. Tiles
+    /// come in ascending order, splats within a tile in theirs.
     pub fn bin_within(
         &mut self,
         bytes: usize,
@@ -68,7 +69,11 @@ impl TileBins {
                 *count += 1;
                 pairs.push((tile, number));
             };
-            if splat.in_space == 0 {
+            if !splat.paints() {
+                let tile = |middle: i32| (middle / (SUBTEXELS * TILE_SIZE as i32)).clamp(0, side as i32 - 1);
+                let [column, row] = splat.center.map(tile);
+                touch((row * side as i32 + column) as u32);
+            } else if splat.in_space == 0 {
                 for row in tiles_on_axis(splat, 1, side, wrap[1]) {
                     tiles_on_axis(splat, 0, side, wrap[0])
                         .for_each(|column| touch((row * side + column) as u32));
@@ -117,7 +122,12 @@ mod tests {
     use bytemuck::Zeroable;
 
     fn splat(center: [i32; 2], radius: i32) -> Splat {
-        Splat { center: center.map(|c| c * 256), radius: [radius * 256; 2], ..Splat::zeroed() }
+        Splat {
+            center: center.map(|c| c * 256),
+            radius: [radius * 256; 2],
+            diffuse: u32::MAX,
+            ..Splat::zeroed()
+        }
     }
 
     fn tiles_of(splats: &[Splat], size: u32, wrap: [Wrap; 2]) -> Vec<((u32, u32), Vec<u32>)> {
@@ -140,6 +150,12 @@ mod tests {
     }
 
     #[test]
+    fn clear_water_touches_the_tile_on_which_it_fell() {
+        let water = Splat { diffuse: 0, water_nl: 7, ..splat([16, 47], 3) };
+        assert_eq!(tiles_of(&[water], 64, [Wrap::Repeat; 2]), [((1, 2), vec![0])]);
+    }
+
+    #[test]
     fn splats_keep_their_order_within_a_tile() {
         let splats = [splat([8, 8], 2), splat([40, 8], 2), splat([9, 9], 2), splat([16, 8], 2)];
         let tiles = tiles_of(&splats, 64, [Wrap::Repeat; 2]);
@@ -148,7 +164,7 @@ mod tests {
 
     #[test]
     fn a_stamp_as_large_as_the_map_is_in_every_tile_once() {
-        let largest = Splat { center: [77, 0], radius: [63 * 128; 2], ..Splat::zeroed() };
+        let largest = Splat { center: [77, 0], radius: [63 * 128; 2], ..splat([0; 2], 0) };
         let tiles = tiles_of(&[largest], 64, [Wrap::Repeat; 2]);
         assert_eq!(tiles.len(), 16);
         assert!(tiles.iter().all(|(_, splats)| splats == &[0]));

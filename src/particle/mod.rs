@@ -36,7 +36,7 @@ pub use integrate::integrate_particles;
 pub use pool::{Particle, Particles};
 pub(crate) use pool::{SavedParticle, chunk_len, for_each_chunk};
 use retire::retire_particles;
-pub(crate) use rows::{BoxRows, ROW};
+pub(crate) use rows::{BoxRows, ROW, WayRows};
 
 /// How long a particle has left, and when within its first tick it was born.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq)]

@@ -83,7 +83,24 @@ impl MotionRows {
     }
 }
 
-/// A box that many segments are held against.
+/// The boxes around the ways of four particles.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct WayRows {
+    low: Rows,
+    high: Rows,
+}
+
+impl WayRows {
+    /// From where they are and how they have come there for so many seconds.
+    #[inline]
+    pub(crate) fn new(ends: &[Vec3; ROW], velocities: &[Vec3; ROW], seconds: f32) -> Self {
+        let ends = Rows::of(ends);
+        let starts = ends.zip(Rows::of(velocities), |end, velocity| end - velocity * seconds);
+        Self { low: starts.zip(ends, Vec4::min), high: starts.zip(ends, Vec4::max) }
+    }
+}
+
+/// A box that many ways are held against.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BoxRows {
     low: Rows,
@@ -96,17 +113,12 @@ impl BoxRows {
         Self { low: Rows::splat(low), high: Rows::splat(high) }
     }
 
-    /// Of four particles and how far each has come, m, those whose way may touch the box: bits 0, 3, 6 and 9. It never leaves
-    /// one out whose way does.
+    /// Those of the four whose way may touch the box: bits 0, 3, 6 and 9. It never leaves one out whose way does.
     #[inline]
-    pub(crate) fn touched(&self, ends: &[Vec3; ROW], velocities: &[Vec3; ROW], seconds: f32) -> u32 {
-        let ends = Rows::of(ends);
-        let starts = ends.zip(Rows::of(velocities), |end, velocity| end - velocity * seconds);
+    pub(crate) fn touched(&self, ways: &WayRows) -> u32 {
         let mut inside = 0;
         for row in 0..3 {
-            let (start, end) = (starts.0[row], ends.0[row]);
-            let (low, high) = (self.low.0[row], self.high.0[row]);
-            let touches = start.min(end).cmple(high) & start.max(end).cmpge(low);
+            let touches = ways.low.0[row].cmple(self.high.0[row]) & ways.high.0[row].cmpge(self.low.0[row]);
             inside |= touches.bitmask() << (4 * row);
         }
         inside & inside >> 1 & inside >> 2 & 0b001_001_001_001
@@ -132,8 +144,9 @@ mod tests {
         // From above into it; past it at the side; through all of it; still outside.
         let ends = [Vec3::splat(0.5), Vec3::new(1.2, 0.5, 0.5), Vec3::new(0.5, -1.0, 0.5), Vec3::splat(3.0)];
         let velocities = [Vec3::NEG_Y, Vec3::NEG_Y, Vec3::NEG_Y * 3.0, Vec3::ZERO];
-        assert_eq!(room.touched(&ends, &velocities, 1.0), 0b000_001_000_001);
+        let ways = WayRows::new(&ends, &velocities, 1.0);
+        assert_eq!(room.touched(&ways), 0b000_001_000_001);
         let nowhere = BoxRows::new((Vec3::INFINITY, Vec3::NEG_INFINITY));
-        assert_eq!(nowhere.touched(&ends, &velocities, 1.0), 0);
+        assert_eq!(nowhere.touched(&ways), 0);
     }
 }

@@ -4,7 +4,6 @@ use std::path::Path;
 
 use bevy::asset::RenderAssetUsages;
 use bevy::prelude::*;
-use bevy::render::storage::ShaderBuffer;
 
 use super::maps::value;
 use super::{AddedEmitter, SaveError, SavedScene, effects, emitters_in_order, surfaces_in_order};
@@ -186,14 +185,12 @@ impl SavedScene {
             let colors = &saved.colors;
             let is_empty = |bytes: &[u8]| bytes.iter().all(|&byte| byte == 0);
             if is_empty(&colors.diffuse) && is_empty(&colors.specular) && is_empty(&colors.normal) {
-                // The first splat will make room.
+                // The first splat that paints will make room.
                 return;
             }
-            world.resource_scope(|world, mut images: Mut<Assets<Image>>| {
-                overlays.open_colors(&mut images, &mut world.resource_mut::<Assets<ShaderBuffer>>());
-            });
             let lying = world.get::<SurfaceFrames>(entity).map(Lying::new);
             let mut images = world.resource_mut::<Assets<Image>>();
+            overlays.open_colors(&mut images);
             for (handle, bytes) in [
                 (&mut overlays.diffuse, &saved.colors.diffuse),
                 (&mut overlays.specular, &saved.colors.specular),

@@ -31,6 +31,11 @@ impl BoxBvh {
         self.tree.bounds.unwrap_or((Vec3::INFINITY, Vec3::NEG_INFINITY))
     }
 
+    /// Up to eight boxes that together hold everything.
+    pub(in crate::collision) fn first_boxes(&self) -> impl Iterator<Item = (Vec3, Vec3)> {
+        self.tree.children(0).map(|(_, bounds)| bounds)
+    }
+
     /// Calls `cast(box, closest)` for the boxes on the segment, with the closest fraction found so far, and
     /// keeps the fraction it returns, if any.
     #[inline]

@@ -37,9 +37,11 @@ pub struct Overlays {
     pub matter: Handle<ShaderBuffer>,
     /// `matter` has room for all texels.
     pub has_matter_room: bool,
-    /// [`RainRing::PER_TILE`] [`RainRing`]s of each tile, row by row; those of a single one while nothing has been painted.
+    /// [`RainRing::PER_TILE`] [`RainRing`]s of each tile, row by row; those of a single one while nothing has fallen.
     pub rings: Handle<ShaderBuffer>,
-    /// The colour maps and `rings` have room for all texels.
+    /// `rings` has room for all tiles.
+    pub has_rings: bool,
+    /// The colour maps have room for all texels.
     pub has_colors: bool,
 }
 
@@ -67,6 +69,7 @@ impl Overlays {
             matter,
             has_matter_room: false,
             rings,
+            has_rings: false,
             has_colors: false,
         }
     }
@@ -85,16 +88,27 @@ impl Overlays {
             matter: default(),
             has_matter_room: false,
             rings: default(),
+            has_rings: false,
             has_colors: false,
         }
     }
 
     /// Makes room for what is painted.
-    pub(crate) fn open_colors(&mut self, images: &mut Assets<Image>, buffers: &mut Assets<ShaderBuffer>) {
+    pub(crate) fn open_colors(&mut self, images: &mut Assets<Image>) {
         [self.diffuse, self.specular, self.normal] = overlay_images(self.size, self.wrap, images);
+        self.has_colors = true;
+    }
+
+    /// Makes room for rings around drops.
+    fn open_rings(&mut self, buffers: &mut Assets<ShaderBuffer>) {
         let rings = ShaderBuffer::with_size(ring_bytes(self.size), RenderAssetUsages::RENDER_WORLD);
         self.rings = buffers.add(rings);
-        self.has_colors = true;
+        self.has_rings = true;
+    }
+
+    /// Whether there is room for what waits.
+    pub(super) fn is_open_for(&self, queue: &SplatQueue) -> bool {
+        self.has_rings && (self.has_colors || !queue.has_painted())
     }
 }
 
@@ -155,7 +169,8 @@ pub(super) fn add_overlays(
             && is_reached(old.size, size)
             && size <= 2 * old.size
         {
-            new.open_colors(&mut images, &mut buffers);
+            new.open_colors(&mut images);
+            new.open_rings(&mut buffers);
             match copies {
                 Some(mut copies) => copies.push(old, &new),
                 None => {
@@ -176,8 +191,14 @@ pub(super) fn open_overlays(
     mut surfaces: Query<(&mut Overlays, &SplatQueue)>,
 ) {
     for (mut overlays, queue) in &mut surfaces {
-        if !overlays.has_colors && !queue.is_empty() {
-            overlays.open_colors(&mut images, &mut buffers);
+        if queue.is_empty() || overlays.is_open_for(queue) {
+            continue;
+        }
+        if !overlays.has_rings {
+            overlays.open_rings(&mut buffers);
+        }
+        if !overlays.has_colors && queue.has_painted() {
+            overlays.open_colors(&mut images);
         }
     }
 }
@@ -189,8 +210,30 @@ pub(super) fn release_overlays(removed: On<Remove, MapSize>, mut commands: Comma
 
 #[cfg(test)]
 mod tests {
+    use bytemuck::Zeroable;
+
     use super::*;
-    use crate::overlay::StampSpace;
+    use crate::overlay::{Splat, StampSpace};
+
+    #[test]
+    fn colour_maps_have_room_once_something_paints() {
+        let mut world = World::new();
+        world.init_resource::<Assets<Image>>();
+        world.init_resource::<Assets<ShaderBuffer>>();
+        let surface = world.spawn((Overlays::bare(64), SplatQueue::default())).id();
+        let mut schedule = Schedule::default();
+        schedule.add_systems(open_overlays);
+        let mut after = |splat: Option<Splat>| {
+            splat.into_iter().for_each(|splat| world.get_mut::<SplatQueue>(surface).unwrap().push(splat));
+            schedule.run(&mut world);
+            let maps = world.get::<Overlays>(surface).unwrap();
+            (maps.has_rings, maps.has_colors)
+        };
+        let water = Splat { water_nl: 7, ..Splat::zeroed() };
+        assert_eq!(after(None), (false, false));
+        assert_eq!(after(Some(water)), (true, false));
+        assert_eq!(after(Some(Splat { diffuse: u32::MAX, ..water })), (true, true));
+    }
 
     #[test]
     fn only_another_size_or_other_edges_cost_what_has_been_painted() {

@@ -22,7 +22,7 @@ use super::prepare::{SplatBatches, SurfaceBatch};
 use super::stats::SplatStats;
 use crate::overlay::Splat;
 
-/// What a batch of splats holds. The pipeline that paints it does nothing else.
+/// What a batch of splats holds, if any of it paints. The pipeline that paints it does nothing else.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub(super) struct SplatKinds {
     on_map: bool,
@@ -35,8 +35,9 @@ impl SplatKinds {
     /// Whatever there may be.
     pub(super) const ALL: Self = Self { on_map: true, in_space: true, domes: true, stamps: true };
 
-    pub(super) fn of(splats: &[Splat]) -> Self {
-        splats.iter().fold(Self::default(), |kinds, splat| {
+    /// None if there is nothing to paint.
+    pub(super) fn of(splats: &[Splat]) -> Option<Self> {
+        let kinds = splats.iter().fold(Self::default(), |kinds, splat| {
             let (in_space, dome) = (splat.in_space != 0, splat.stamp == 0);
             Self {
                 on_map: kinds.on_map | !in_space,
@@ -44,7 +45,8 @@ impl SplatKinds {
                 domes: kinds.domes | dome,
                 stamps: kinds.stamps | !dome,
             }
-        })
+        });
+        splats.iter().any(Splat::paints).then_some(kinds)
     }
 
     pub(super) fn in_space(self) -> bool {
@@ -187,12 +189,14 @@ pub(super) fn paint_splats(
     let mut pass = encoder
         .begin_compute_pass(&ComputePassDescriptor { label: Some("paint splats"), timestamp_writes: None });
     for job in &batches.jobs {
-        // Prepared this frame, so it is there.
-        let Some(pipeline) = cache.get_compute_pipeline(job.pipeline) else { continue };
-        pass.set_pipeline(pipeline);
         pass.set_bind_group(0, frame, &[job.batch_offset]);
         pass.set_bind_group(1, &job.surface, &[]);
-        pass.dispatch_workgroups(job.tiles, 1, 1);
+        if let Some(painting) = job.painting {
+            // Prepared this frame, so it is there.
+            let Some(pipeline) = cache.get_compute_pipeline(painting) else { continue };
+            pass.set_pipeline(pipeline);
+            pass.dispatch_workgroups(job.tiles, 1, 1);
+        }
         pass.set_pipeline(rings);
         pass.dispatch_workgroups(job.tiles.div_ceil(64), 1, 1);
     }
@@ -209,12 +213,19 @@ mod tests {
 
     #[test]
     fn a_batch_is_painted_by_a_pipeline_that_knows_all_of_it() {
-        let splat = |in_space, stamp| Splat { in_space, stamp, ..Splat::zeroed() };
-        let kinds = |splats: &[Splat]| SplatKinds::of(splats).shader_defs();
+        let splat = |in_space, stamp| Splat { in_space, stamp, diffuse: u32::MAX, ..Splat::zeroed() };
+        let kinds = |splats: &[Splat]| SplatKinds::of(splats).unwrap().shader_defs();
         let names = |names: &[&str]| names.iter().map(|&name| name.into()).collect::<Vec<ShaderDefVal>>();
         assert_eq!(kinds(&[splat(0, 0), splat(0, 0)]), names(&["ON_MAP", "DOMES"]));
         assert_eq!(kinds(&[splat(0, 3)]), names(&["ON_MAP", "STAMPS", "NEEDS_AXES"]));
         assert_eq!(kinds(&[splat(1, 0)]), names(&["IN_SPACE", "DOMES", "NEEDS_AXES"]));
-        assert_eq!(SplatKinds::of(&[splat(1, 3), splat(0, 0)]), SplatKinds::ALL);
+        assert_eq!(SplatKinds::of(&[splat(1, 3), splat(0, 0)]), Some(SplatKinds::ALL));
+        // Clear water needs none.
+        let water = Splat { water_nl: 7, ..Splat::zeroed() };
+        assert_eq!(SplatKinds::of(&[water, water]), None);
+        assert_eq!(
+            kinds(&[water, splat(1, 3)]),
+            names(&["ON_MAP", "IN_SPACE", "DOMES", "STAMPS", "NEEDS_AXES"])
+        );
     }
 }

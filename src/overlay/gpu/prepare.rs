@@ -133,7 +133,7 @@ pub(super) fn extract_splats(
             waiting.maps = maps;
         }
         // Splats for which there is no room yet wait where they are.
-        if queue.is_empty() || !overlays.has_colors {
+        if queue.is_empty() || !overlays.is_open_for(&queue) {
             continue;
         }
         let index = *by_entity.entry(entity).or_insert_with(|| {
@@ -217,9 +217,10 @@ pub(super) struct SplatBatches {
     pub(super) jobs: Vec<Job>,
 }
 
-/// One dispatch.
+/// The splats of one surface.
 pub(super) struct Job {
-    pub(super) pipeline: CachedComputePipelineId,
+    /// The pipeline that paints them; none if they are all clear water.
+    pub(super) painting: Option<CachedComputePipelineId>,
     pub(super) surface: BindGroup,
     pub(super) batch_offset: u32,
     pub(super) tiles: u32,
@@ -315,7 +316,7 @@ pub(super) fn prepare_splats(
         let taken = bins.bin_within(bytes, batch, size, wrap, frames, first_splat, headers, entries);
         let batch = &batch[..taken];
         let kinds = SplatKinds::of(batch);
-        if kinds.in_space()
+        if kinds.is_some_and(SplatKinds::in_space)
             && waiting.frame_buffer.is_none()
             && let Some(frames) = frames
         {
@@ -335,10 +336,12 @@ pub(super) fn prepare_splats(
         }));
         splats.values.extend_from_slice(batch);
         let touched = tiles.len() as u32 - first_tile;
-        mips.add(levels, size, &tiles.values()[first_tile as usize..]);
+        if kinds.is_some() {
+            mips.add(levels, size, &tiles.values()[first_tile as usize..]);
+        }
         let clamped = UVec2::from_array(wrap.map(|wrap| u32::from(wrap == Wrap::Clamp)));
         jobs.push(Job {
-            pipeline: pipeline.painting(kinds, &mut pipelines, &cache),
+            painting: kinds.map(|kinds| pipeline.painting(kinds, &mut pipelines, &cache)),
             surface: device.create_bind_group(
                 "weathering surface",
                 &cache.get_bind_group_layout(&pipeline.surface_layout),
@@ -389,7 +392,7 @@ mod tests {
     /// A main world with one surface, inside a render world, as `ExtractSchedule` sees them.
     fn worlds() -> (World, Entity) {
         let mut main = MainWorld::default();
-        let overlays = Overlays { has_colors: true, ..Overlays::bare(512) };
+        let overlays = Overlays { has_rings: true, has_colors: true, ..Overlays::bare(512) };
         let surface = main.spawn((overlays, SplatQueue::default())).id();
         let mut render = World::new();
         render.insert_resource(main);

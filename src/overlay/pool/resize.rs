@@ -239,7 +239,7 @@ pub(crate) fn can_put_size(world: &World, surface: Entity, to: u32) -> bool {
     };
     let is_painted = world
         .get::<Overlays>(surface)
-        .is_some_and(|maps| maps.has_colors || maps.has_room || maps.has_matter_room);
+        .is_some_and(|maps| maps.has_colors || maps.has_rings || maps.has_room || maps.has_matter_room);
     let is_allowed = to.is_multiple_of(TILE_SIZE) && to <= size.limit && is_reached(size.texels, to);
     geometry.0.size() == size.texels && is_allowed && !is_painted
 }
