@@ -367,3 +367,18 @@ fn without_a_driver_nothing_is_written() {
     assert_failed(&outcome, &["no graphics adapter", "mesa-vulkan-drivers", "--no-render"]);
     assert!(!out.exists() && !kept.exists());
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_display_without_a_server_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = scene(folder.path());
+    let out = folder.path().join("out");
+    for (display, named) in [(":4321", "DISPLAY is \":4321\""), ("", "DISPLAY is not set")] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_weathering"));
+        command.arg("sandbox").arg(&file).arg("--out").arg(&out).env("DISPLAY", display);
+        command.env("XDG_RUNTIME_DIR", folder.path()).env("XDG_CONFIG_HOME", folder.path().join("config"));
+        assert_failed(&run(&mut command), &["error: no display", named, "weathering replay"]);
+        assert!(!out.exists() && !folder.path().join("config").exists());
+    }
+}

@@ -48,9 +48,7 @@ fn the_camera_turns_flies_and_comes_back_and_two_settings_are_seen_beside_each_o
     // A hose that is shut: all that changes is where it is seen from.
     let scenery = Scenery::new(&SCENARIO.replace("rate: 500.0", "rate: 0.0"));
     scenery.remember("(panel: \"Compare\", tool: Probe)");
-    let mut sandbox = Sandbox::start(&screen, &scenery);
-    sandbox.key("space");
-    sandbox.state("paused");
+    let mut sandbox = Sandbox::start_paused(&screen, &scenery);
 
     // In orbit what it looks at stays in the middle, in flight it does not.
     assert!(off(middle(&mut sandbox)) < 0.05);

@@ -42,8 +42,7 @@ fn keys_pause_start_over_take_pictures_and_leave() {
         (first.as_raw() != sandbox.picture().as_raw()).then_some(())
     });
     // Paused and started over: dry, and nothing moves.
-    sandbox.key("space");
-    sandbox.state("paused");
+    sandbox.pause();
     sandbox.key("r");
     let dry = wait_for("a picture that stands still", || {
         let picture = sandbox.picture();
@@ -54,8 +53,7 @@ fn keys_pause_start_over_take_pictures_and_leave() {
     sandbox.state("running");
     wait_for("the floor to get wet", || (darker_part(&sandbox.picture(), &dry) > 0.01).then_some(()));
     // Started over once more: the same picture as before, to the pixel.
-    sandbox.key("space");
-    sandbox.state("paused");
+    sandbox.pause();
     sandbox.key("r");
     wait_for("the dry floor", || (sandbox.picture().as_raw() == dry.as_raw()).then_some(()));
     // Dragging with the right button turns the camera.
@@ -105,8 +103,7 @@ fn a_brush_wets_what_is_under_the_mouse_and_a_stroke_is_taken_back() {
         let picture = sandbox.picture();
         (floor_part(&picture) > 0.4 && picture.as_raw() == sandbox.picture().as_raw()).then_some(picture)
     });
-    sandbox.key("space");
-    sandbox.state("paused");
+    sandbox.pause();
     sandbox.key("1");
     // A frame may take longer than a short stroke: it is painted until it is seen.
     let darkest = wait_for("the stroke to be seen", || {

@@ -203,7 +203,7 @@ impl Scenery {
         fs::write(file, settings).unwrap();
     }
 
-    /// What the program remembers for another time; nothing if it has changed nothing.
+    /// What the program remembers for another time; nothing if no setting has ever changed.
     pub fn remembered(&self) -> String {
         fs::read_to_string(self.settings()).unwrap_or_default()
     }
@@ -250,6 +250,19 @@ impl<'a> Sandbox<'a> {
         screen.xdotool(&["windowfocus", "--sync", &sandbox.window]);
         sandbox.state("running");
         sandbox
+    }
+
+    /// The same, and pauses, so that nothing moves but what the test moves.
+    pub fn start_paused(screen: &'a Screen, scenery: &'a Scenery) -> Self {
+        let mut sandbox = Self::start(screen, scenery);
+        sandbox.pause();
+        sandbox
+    }
+
+    /// Presses the key, and waits until time stands still.
+    pub fn pause(&mut self) {
+        self.key("space");
+        self.state("paused");
     }
 
     /// Waits until something is found, or the program ends.
@@ -317,7 +330,7 @@ impl<'a> Sandbox<'a> {
         self.window.parse().unwrap()
     }
 
-    /// Moves the mouse to a place and clicks the left button. In the scene that is lost if the last frame saw the mouse in a panel.
+    /// Moves the mouse to a place and clicks the left button.
     pub fn click(&self, [x, y]: [u32; 2]) {
         self.xdotool(&["mousemove", &x.to_string(), &y.to_string(), "click", "1"]);
     }

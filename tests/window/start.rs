@@ -39,8 +39,7 @@ fn the_window_appears_with_its_first_picture_and_effects_follow_their_files() {
     // What makes no sense is told, and nothing ends.
     fs::write(scenery.effect(), effect.replace("volume_mm3: 90.0", "volume_mm3: -1.0")).unwrap();
     sandbox.says("field `volume_mm3` is -1");
-    sandbox.key("space");
-    sandbox.state("paused");
+    sandbox.pause();
     sandbox.key("Escape");
     let status = sandbox.end();
     assert!(status.success(), "{status}");

@@ -18,9 +18,7 @@ fn step(sandbox: &mut Sandbox) -> u32 {
 fn time_goes_tick_by_tick_and_faster_and_slower_and_sequences_are_of_all_of_it() {
     let Some(screen) = Screen::start() else { return };
     let scenery = Scenery::new(SCENARIO);
-    let mut sandbox = Sandbox::start(&screen, &scenery);
-    sandbox.key("space");
-    sandbox.state("paused");
+    let mut sandbox = Sandbox::start_paused(&screen, &scenery);
     let first = step(&mut sandbox);
     assert_eq!([first + 1, first + 2], [step(&mut sandbox), step(&mut sandbox)]);
 

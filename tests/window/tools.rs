@@ -43,10 +43,8 @@ fn lit(screen: &Screen) -> [f64; 2] {
 fn maps_and_the_probe_tell_of_a_stroke_and_of_a_jet_and_the_stroke_is_taken_back() {
     let Some(screen) = Screen::start() else { return };
     let scenery = Scenery::new(SCENARIO);
-    let mut sandbox = Sandbox::start(&screen, &scenery);
+    let mut sandbox = Sandbox::start_paused(&screen, &scenery);
     // From the start, and a tick later: nothing is wet, and water is of a time that is known.
-    sandbox.key("space");
-    sandbox.state("paused");
     sandbox.answer("started over", |sandbox| sandbox.key("r"));
     // The mouse, which is drawn, too, where nothing is looked at.
     sandbox.xdotool(&["mousemove", "480", "440"]);

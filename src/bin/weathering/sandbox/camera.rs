@@ -8,6 +8,7 @@ use bevy_weathering::collision::CollisionScene;
 use bevy_weathering::scenario::ScenarioCamera;
 
 use super::settings::Settings;
+use super::shortcuts::Shortcuts;
 use super::split::{self, Split};
 use super::ui::{UiInput, keyboard_is_free};
 
@@ -98,7 +99,7 @@ impl View {
 
 pub fn plugin(app: &mut App) {
     app.add_systems(PreUpdate, take_over)
-        .add_systems(Update, (steer, (fly, frame_scene).run_if(keyboard_is_free), place).chain());
+        .add_systems(Update, (steer, fly.run_if(keyboard_is_free), frame_scene, place).chain());
 }
 
 /// Begins where the scenario's camera begins, and is free from then on.
@@ -149,8 +150,13 @@ fn notches(scroll: &AccumulatedMouseScroll) -> f32 {
 }
 
 /// Keys move it, in either mode.
-fn fly(keys: Res<ButtonInput<KeyCode>>, time: Res<Time<Real>>, mut views: Query<&mut View>) {
-    let axis = |plus, minus| f32::from(keys.pressed(plus)) - f32::from(keys.pressed(minus));
+fn fly(
+    shortcuts: Res<Shortcuts>,
+    keys: Res<ButtonInput<KeyCode>>,
+    time: Res<Time<Real>>,
+    mut views: Query<&mut View>,
+) {
+    let axis = |plus, minus| f32::from(shortcuts.is_held(plus)) - f32::from(shortcuts.is_held(minus));
     let way = Vec3::new(
         axis(KeyCode::KeyD, KeyCode::KeyA),
         axis(KeyCode::KeyE, KeyCode::KeyQ),
@@ -169,12 +175,12 @@ fn fly(keys: Res<ButtonInput<KeyCode>>, time: Res<Time<Real>>, mut views: Query<
 
 /// F looks at all of it.
 fn frame_scene(
-    keys: Res<ButtonInput<KeyCode>>,
+    keys: Res<Shortcuts>,
     scene: Res<CollisionScene>,
     split: Option<Res<Split>>,
     mut views: Query<(&mut View, &Projection)>,
 ) {
-    if !keys.just_pressed(KeyCode::KeyF) || scene.is_empty() {
+    if !keys.pressed(KeyCode::KeyF) || scene.is_empty() {
         return;
     }
     for (mut view, projection) in &mut views {
@@ -198,6 +204,10 @@ fn place(mut views: Query<(&View, &mut Transform), Changed<View>>) {
 
 #[cfg(test)]
 mod tests {
+    use bevy::math::DVec2;
+    use bevy::window::PrimaryWindow;
+
+    use super::super::ui::judge_pointer;
     use super::*;
 
     const EYE: Vec3 = Vec3::new(3.0, 2.0, -4.0);
@@ -257,6 +267,42 @@ mod tests {
         let scroll = |unit, pixels| notches(&AccumulatedMouseScroll { unit, delta: Vec2::Y * pixels });
         assert_eq!(scroll(MouseScrollUnit::Line, 2.0), 2.0);
         assert_eq!(scroll(MouseScrollUnit::Pixel, 50.0), 0.5);
+    }
+
+    #[test]
+    fn the_wheel_and_the_buttons_are_the_scenes_where_the_mouse_is_now() {
+        let mut world = World::new();
+        world.init_resource::<Settings>();
+        // Panels at the left, and a window in front of the scene.
+        let free = Some(Rect::new(300.0, 0.0, 960.0, 540.0));
+        let fronts = vec![Rect::new(500.0, 0.0, 600.0, 540.0)];
+        world.insert_resource(UiInput { free, fronts, ..default() });
+        let mut window = Window::default();
+        window.resolution.set_physical_resolution(960, 540);
+        let window = world.spawn((window, PrimaryWindow)).id();
+        let view = world.spawn(View::new(EYE, TARGET)).id();
+        let mut schedule = Schedule::default();
+        schedule.add_systems((judge_pointer, steer).chain());
+        let mut moves = |x: f64, is_wheel: bool| {
+            let at = Some(DVec2::new(x, 100.0));
+            world.get_mut::<Window>(window).unwrap().set_physical_cursor_position(at);
+            let mut buttons = ButtonInput::<MouseButton>::default();
+            let (mut scrolled, mut moved) = (Vec2::Y, Vec2::ZERO);
+            if !is_wheel {
+                buttons.press(MouseButton::Right);
+                (scrolled, moved) = (Vec2::ZERO, Vec2::X * 10.0);
+            }
+            world.insert_resource(buttons);
+            world.insert_resource(AccumulatedMouseScroll { unit: MouseScrollUnit::Line, delta: scrolled });
+            world.insert_resource(AccumulatedMouseMotion { delta: moved });
+            let before = *world.get::<View>(view).unwrap();
+            schedule.run(&mut world);
+            *world.get::<View>(view).unwrap() != before
+        };
+        for is_wheel in [true, false] {
+            let moved = [400.0, 200.0, 700.0, 550.0, 400.0].map(|x| moves(x, is_wheel));
+            assert_eq!(moved, [true, false, true, false, true], "wheel: {is_wheel}");
+        }
     }
 
     #[test]

@@ -12,9 +12,10 @@ use bevy_weathering::export::{ColorReadback, ExportError, Snapshot};
 use bevy_weathering::scenario::ScenarioStatus;
 
 use super::open::Opened;
+use super::shortcuts::Shortcuts;
 use super::shots::{OutFolder, free_name};
 use super::split::Split;
-use super::ui::{Note, keyboard_is_free};
+use super::ui::Note;
 use super::{record, saving};
 
 /// Frames that time stands still before anything is read.
@@ -34,7 +35,7 @@ enum Step {
 }
 
 pub fn plugin(app: &mut App) {
-    app.init_resource::<Exporting>().add_systems(Update, (key.run_if(keyboard_is_free), advance).chain());
+    app.init_resource::<Exporting>().add_systems(Update, (key, advance).chain());
 }
 
 /// Whether the scene has to stay as it is.
@@ -112,8 +113,8 @@ fn obstacle(world: &World) -> Option<&'static str> {
     saving::is_busy(world).then_some("Wait until the scene is saved.")
 }
 
-fn key(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
-    if keys.just_pressed(KeyCode::KeyX) {
+fn key(keys: Res<Shortcuts>, mut commands: Commands) {
+    if keys.pressed(KeyCode::KeyX) {
         commands.queue(begin);
     }
 }

@@ -1,13 +1,13 @@
 //! Keys, and the list of them.
 
-use bevy::input::InputSystems;
 use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::prelude::*;
 use bevy_egui::egui;
 
 use super::pace::start_over;
 use super::settings::{Settings, Tool};
-use super::ui::{Help, keyboard_is_free};
+use super::shortcuts::{self, Shortcuts};
+use super::ui::Help;
 
 /// Every key and mouse button, and what it does.
 const KEYS: &[(&str, &str)] = &[
@@ -39,32 +39,26 @@ const KEYS: &[(&str, &str)] = &[
 ];
 
 pub fn plugin(app: &mut App) {
-    app.add_systems(Update, reset.run_if(keyboard_is_free))
+    app.add_systems(Update, reset)
         // Before tools do anything: a slow frame may see one chosen and used.
-        .add_systems(PreUpdate, choose.run_if(keyboard_is_free).after(InputSystems));
+        .add_systems(PreUpdate, choose.after(shortcuts::listen));
 }
 
-fn reset(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
-    if keys.just_pressed(KeyCode::KeyR) {
+fn reset(keys: Res<Shortcuts>, mut commands: Commands) {
+    if keys.pressed(KeyCode::KeyR) {
         commands.queue(start_over);
     }
 }
 
 /// Whether somebody has typed a question mark, wherever it is on their keyboard.
-fn asks(input: &KeyboardInput) -> bool {
+pub fn asks(input: &KeyboardInput) -> bool {
     input.state.is_pressed() && !input.repeat && input.logical_key == Key::Character("?".into())
 }
 
 /// Keys that change settings.
-fn choose(
-    keys: Res<ButtonInput<KeyCode>>,
-    mut typed: MessageReader<KeyboardInput>,
-    mut settings: ResMut<Settings>,
-    mut help: ResMut<Help>,
-) {
-    let pressed = |key| keys.just_pressed(key);
-    let is_asked = typed.read().filter(|input| asks(input)).count() % 2 == 1;
-    if pressed(KeyCode::F1) || is_asked {
+fn choose(keys: Res<Shortcuts>, mut settings: ResMut<Settings>, mut help: ResMut<Help>) {
+    let pressed = |key| keys.pressed(key);
+    if pressed(KeyCode::F1) || keys.is_asked() {
         help.0 = !help.0;
     }
     if pressed(KeyCode::KeyU) {

@@ -7,7 +7,8 @@ use bevy::window::WindowCloseRequested;
 use bevy_weathering::replay::describe_render_error;
 
 use super::saving::Saving;
-use super::ui::{Help, Note, UiInput, keyboard_is_free};
+use super::shortcuts::Shortcuts;
+use super::ui::{Help, Note, UiInput};
 
 /// The program ends as soon as nothing is being saved.
 #[derive(Resource, Default)]
@@ -16,19 +17,19 @@ pub struct Leaving(pub bool);
 pub fn plugin(app: &mut App) {
     app.init_resource::<Leaving>()
         .insert_resource(RenderErrorHandler(give_up))
-        .add_systems(Update, (press.run_if(keyboard_is_free), close).chain())
+        .add_systems(Update, (press, close).chain())
         .add_systems(PostUpdate, leave)
         .add_systems(Last, finish_writing);
 }
 
 fn press(
-    keys: Res<ButtonInput<KeyCode>>,
+    keys: Res<Shortcuts>,
     input: Res<UiInput>,
     mut help: ResMut<Help>,
     mut leaving: ResMut<Leaving>,
     mut exit: MessageWriter<AppExit>,
 ) {
-    if !keys.just_pressed(KeyCode::Escape) || input.popup {
+    if !keys.pressed(KeyCode::Escape) || input.popup {
         return;
     }
     // What is in front goes first.

@@ -6,6 +6,7 @@ mod added;
 mod boxes;
 mod brush;
 mod camera;
+mod display;
 mod effects;
 mod emitters;
 mod export;
@@ -27,6 +28,7 @@ mod scenes;
 mod selection;
 mod settings;
 mod shades;
+mod shortcuts;
 mod shots;
 mod sources;
 mod split;
@@ -59,10 +61,8 @@ use crate::cli::SandboxArgs;
 pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
     let begun = reveal::Begun(Instant::now());
     let loaded = open::load(&arguments.file, arguments.variant.as_deref())?;
+    display::require_display()?;
     require_adapter()?;
-    if cfg!(target_os = "linux") && std::env::var_os("DISPLAY").is_none() {
-        return Err("no display: DISPLAY is not set; use `weathering replay`, or start one (Xvfb)".into());
-    }
     // What takes seconds is made while the window is there already.
     let is_slow = open::is_slow(&loaded);
     let first = if is_slow { open::without_content(&loaded) } else { loaded.clone() };
@@ -96,6 +96,7 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
         // In the order of their panels.
         .add_plugins((hose_and_time, scene_panels))
         .add_plugins((
+            shortcuts::plugin,
             keys::plugin,
             title::plugin,
             open::plugin,

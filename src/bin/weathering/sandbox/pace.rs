@@ -11,7 +11,8 @@ use bevy_weathering::record::Recording;
 use bevy_weathering::scenario::{ScenarioStatus, reset_scenario};
 use bevy_weathering::schedule::WeatheringTick;
 
-use super::ui::{AddPanel, Note, Place, keyboard_is_free};
+use super::shortcuts::Shortcuts;
+use super::ui::{AddPanel, Note, Place};
 use super::{export, record, saving, theme};
 
 /// Slowest and fastest.
@@ -22,16 +23,12 @@ pub const BUDGET_MS: f32 = 100.0;
 const HELD_BACK: f32 = 0.95;
 
 pub fn plugin(app: &mut App) {
-    app.add_systems(Update, (pause, step, hurry).run_if(keyboard_is_free)).add_panel(
-        Place::Bar,
-        "time",
-        show,
-    );
+    app.add_systems(Update, (pause, step, hurry)).add_panel(Place::Bar, "time", show);
 }
 
 /// Twice or half as fast, within [`SPEEDS`].
-fn hurry(keys: Res<ButtonInput<KeyCode>>, mut time: ResMut<Time<Virtual>>, mut note: ResMut<Note>) {
-    let pressed = |key| i32::from(keys.just_pressed(key));
+fn hurry(keys: Res<Shortcuts>, mut time: ResMut<Time<Virtual>>, mut note: ResMut<Note>) {
+    let pressed = |key| i32::from(keys.pressed(key));
     let steps = pressed(KeyCode::Period) - pressed(KeyCode::Comma);
     if steps != 0 {
         let speed = stepped(time.relative_speed_f64(), steps);
@@ -48,14 +45,14 @@ fn stepped(speed: f64, doublings: i32) -> f64 {
     faster.clamp(SPEEDS.0, SPEEDS.1)
 }
 
-fn pause(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
-    if keys.just_pressed(KeyCode::Space) {
+fn pause(keys: Res<Shortcuts>, mut commands: Commands) {
+    if keys.pressed(KeyCode::Space) {
         commands.queue(toggle);
     }
 }
 
-fn step(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
-    if keys.just_pressed(KeyCode::KeyN) {
+fn step(keys: Res<Shortcuts>, mut commands: Commands) {
+    if keys.pressed(KeyCode::KeyN) {
         commands.queue(one_tick);
     }
 }

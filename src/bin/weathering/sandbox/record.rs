@@ -23,9 +23,10 @@ use super::camera::View;
 use super::hose::{self, InHand};
 use super::open::Opened;
 use super::settings::Settings;
+use super::shortcuts::Shortcuts;
 use super::shots::{OutFolder, free_name};
 use super::split::Split;
-use super::ui::{AddPanel, Note, Place, keyboard_is_free};
+use super::ui::{AddPanel, Note, Place};
 use super::weather::{self, OwnRain};
 use super::{added, export, model, saving, theme};
 
@@ -68,7 +69,7 @@ pub fn plugin(app: &mut App) {
         .init_resource::<LastView>()
         // No tick may run by itself on the way to another second.
         .add_systems(PreUpdate, stand_still)
-        .add_systems(Update, (press.run_if(keyboard_is_free), advance))
+        .add_systems(Update, (press, advance))
         .add_systems(Last, write_at_the_end)
         .add_panel(Place::Bar, "record", show_bar);
 }
@@ -104,8 +105,8 @@ fn stand_still(travel: Res<Travel>, mut time: ResMut<Time<Virtual>>) {
     }
 }
 
-fn press(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
-    if keys.just_pressed(KeyCode::F9) {
+fn press(keys: Res<Shortcuts>, mut commands: Commands) {
+    if keys.pressed(KeyCode::F9) {
         commands.queue(toggle);
     }
 }

@@ -10,7 +10,8 @@ use bevy_weathering::clock::WeatheringClock;
 use bevy_weathering::replay::write_png;
 
 use super::settings::Settings;
-use super::ui::{AddPanel, Note, Place, UiCamera, keyboard_is_free};
+use super::shortcuts::Shortcuts;
+use super::ui::{AddPanel, Note, Place, UiCamera};
 
 /// Where pictures and saved scenes go.
 #[derive(Resource)]
@@ -32,7 +33,7 @@ struct Wanted(Option<PathBuf>);
 pub fn plugin(app: &mut App) {
     app.init_resource::<Sequence>()
         .init_resource::<Wanted>()
-        .add_systems(Update, keys.run_if(keyboard_is_free))
+        .add_systems(Update, keys)
         .add_systems(PostUpdate, (follow_sequence, take).chain())
         .add_panel(Place::Side, "Files", show);
 }
@@ -49,11 +50,11 @@ pub fn free_name(folder: &Path, name: &str, extension: &str) -> PathBuf {
     }
 }
 
-fn keys(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
-    if keys.just_pressed(KeyCode::F12) {
+fn keys(keys: Res<Shortcuts>, mut commands: Commands) {
+    if keys.pressed(KeyCode::F12) {
         commands.queue(want_picture);
     }
-    if keys.just_pressed(KeyCode::F11) {
+    if keys.pressed(KeyCode::F11) {
         commands.queue(toggle_sequence);
     }
 }

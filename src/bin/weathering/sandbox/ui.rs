@@ -8,14 +8,18 @@ use std::time::{Duration, Instant};
 
 use bevy::camera::visibility::RenderLayers;
 use bevy::camera::{CameraOutputMode, ClearColorConfig};
+use bevy::input::InputSystems;
 use bevy::prelude::*;
 use bevy::render::render_resource::BlendState;
+use bevy::window::PrimaryWindow;
 use bevy_egui::{
-    EguiContext, EguiGlobalSettings, EguiPlugin, EguiPrimaryContextPass, PrimaryEguiContext, egui,
+    EguiContext, EguiGlobalSettings, EguiPlugin, EguiPrimaryContextPass, PrimaryEguiContext,
+    egui::{self, output::OutputEvent},
 };
 
 use super::open::Opening;
 use super::settings::Settings;
+use super::shortcuts::Shortcuts;
 use super::{keys, split, theme};
 
 /// Draws a panel.
@@ -52,17 +56,33 @@ impl AddPanel for App {
     }
 }
 
-/// What the panels use of mouse and keyboard, as of the last frame.
+/// What the panels use of mouse and keyboard: but for `pointer`, as of the last frame.
 #[derive(Resource, Default)]
 pub struct UiInput {
-    /// The pointer is over a panel, or drags something of it.
+    /// The mouse is over a panel where it is now, or drags something of it: what it does is not done to the scene.
     pub pointer: bool,
-    /// What panels leave of the window, physical pixels, if that is known. The pointer may have come out of it since.
+    /// Something of the panels is held by the mouse.
+    pub drags: bool,
+    /// What panels leave of the window, physical pixels, if that is known.
     pub free: Option<Rect>,
+    /// What lies in front of that, physical pixels: windows, and the line between two scenes.
+    pub fronts: Vec<Rect>,
     /// A text is being edited.
     pub keyboard: bool,
+    /// A field was entered, and maybe left again.
+    pub edited: bool,
     /// A list or the like is open in front, which Escape closes.
     pub popup: bool,
+}
+
+impl UiInput {
+    /// Whether panels, or what lies in front of the scene, take what the mouse does at a place, physical pixels.
+    pub fn takes(&self, at: Vec2) -> bool {
+        // A list is closed by a click anywhere.
+        self.popup
+            || self.free.is_some_and(|free| !free.contains(at))
+            || self.fronts.iter().any(|front| front.contains(at))
+    }
 }
 
 /// The help is open.
@@ -112,10 +132,23 @@ pub fn plugin(app: &mut App) {
         .init_resource::<Help>()
         .init_resource::<Note>()
         .add_systems(Startup, spawn_camera)
-        .add_systems(Update, turn_over.run_if(keyboard_is_free))
+        .add_systems(PreUpdate, judge_pointer.after(InputSystems))
+        .add_systems(Update, turn_over)
         .add_systems(EguiPrimaryContextPass, draw);
     // The scene's camera would be taken, which goes with the scene.
     app.world_mut().resource_mut::<EguiGlobalSettings>().auto_create_primary_context = false;
+}
+
+/// Whose the mouse is, where it is now: it may have moved since the panels were drawn.
+pub fn judge_pointer(
+    buttons: Res<ButtonInput<MouseButton>>,
+    window: Query<&Window, With<PrimaryWindow>>,
+    mut input: ResMut<UiInput>,
+) {
+    let at = window.single().ok().and_then(Window::physical_cursor_position);
+    // What is pressed anew has let go of what it dragged.
+    let drags = input.drags && !buttons.just_pressed(MouseButton::Left);
+    input.pointer = drags || at.map_or(input.popup, |at| input.takes(at));
 }
 
 fn spawn_camera(mut commands: Commands) {
@@ -196,19 +229,36 @@ fn draw(world: &mut World, mut is_dressed: Local<bool>) {
         keys::show_help(&context, &mut help);
         world.resource_mut::<Help>().0 = help;
     }
-    let outside = context.pointer_latest_pos().is_some_and(|at| !free.contains(at));
     let corner = |at: egui::Pos2| Vec2::new(at.x, at.y) * context.pixels_per_point();
+    let physical = |rect: egui::Rect| Rect::from_corners(corner(rect.min), corner(rect.max));
     let mut input = world.resource_mut::<UiInput>();
-    input.free = Some(Rect::from_corners(corner(free.min), corner(free.max)));
+    input.free = Some(physical(free));
+    input.fronts.clear();
+    input.fronts.extend(fronts(&context).map(physical));
     input.popup = context.any_popup_open();
-    input.pointer =
-        outside || context.egui_is_using_pointer() || input.popup || context.is_pointer_over_egui();
-    input.keyboard = context.text_edit_focused();
+    input.drags = context.egui_is_using_pointer();
+    input.edited |= context.output(|output| output.events.iter().any(enters));
+    // A number that is clicked becomes a text in the next frame.
+    input.keyboard = context.text_edit_focused() || (input.edited && context.egui_wants_keyboard_input());
+}
+
+/// What lies in front of the panels and of the scene and takes clicks, points.
+fn fronts(context: &egui::Context) -> impl Iterator<Item = egui::Rect> {
+    let layers = context.memory(|memory| memory.areas().visible_layer_ids());
+    let layers = layers.into_iter().filter(|layer| layer.order != egui::Order::Background);
+    let areas = layers.filter_map(move |layer| egui::AreaState::load(context, layer.id));
+    areas.filter(|area| area.interactable).map(|area| area.rect())
+}
+
+/// Whether a text, or a number, begins to be edited.
+fn enters(event: &OutputEvent) -> bool {
+    let begins = !matches!(event, OutputEvent::TextSelectionChanged(_) | OutputEvent::ValueChanged(_));
+    begins && matches!(event.widget_info().typ, egui::WidgetType::TextEdit | egui::WidgetType::DragValue)
 }
 
 /// The panel before the open one, or the one after it.
-fn turn_over(keys: Res<ButtonInput<KeyCode>>, panels: Res<Panels>, mut settings: ResMut<Settings>) {
-    let pressed = |key| isize::from(keys.just_pressed(key));
+fn turn_over(keys: Res<Shortcuts>, panels: Res<Panels>, mut settings: ResMut<Settings>) {
+    let pressed = |key| isize::from(keys.pressed(key));
     let steps = pressed(KeyCode::PageDown) - pressed(KeyCode::PageUp);
     if steps != 0 {
         let sides = panels.0.iter().filter(|(place, ..)| *place == Place::Side);
@@ -295,6 +345,88 @@ fn show_note(context: &egui::Context, free: egui::Rect, note: &Note) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A window of which panels leave the right part, and in that part something in front.
+    fn window() -> World {
+        let mut world = World::new();
+        world.init_resource::<ButtonInput<MouseButton>>();
+        world.insert_resource(UiInput {
+            free: Some(Rect::new(300.0, 40.0, 960.0, 540.0)),
+            fronts: vec![Rect::new(600.0, 40.0, 610.0, 540.0)],
+            ..default()
+        });
+        let mut window = Window::default();
+        window.resolution.set_physical_resolution(960, 540);
+        world.spawn((window, PrimaryWindow));
+        world
+    }
+
+    /// Whose the mouse is where it has come to, before panels are drawn.
+    fn is_taken(world: &mut World, x: f64) -> bool {
+        let mut windows = world.query::<&mut Window>();
+        let at = Some(bevy::math::DVec2::new(x, 100.0));
+        windows.single_mut(world).unwrap().set_physical_cursor_position(at);
+        world.run_system_cached(judge_pointer).unwrap();
+        world.resource::<UiInput>().pointer
+    }
+
+    #[test]
+    fn the_mouse_is_the_scenes_where_it_is_now() {
+        let mut world = window();
+        let taken = [400.0, 200.0, 400.0, 605.0, 700.0].map(|x| is_taken(&mut world, x));
+        assert_eq!(taken, [false, true, false, true, false]);
+        // A list in front is closed by a click anywhere.
+        world.resource_mut::<UiInput>().popup = true;
+        assert!(is_taken(&mut world, 400.0));
+    }
+
+    #[test]
+    fn what_is_dragged_from_a_panel_is_dragged_until_the_button_is_pressed_anew() {
+        let mut world = window();
+        world.resource_mut::<UiInput>().drags = true;
+        assert!(is_taken(&mut world, 400.0));
+        world.resource_mut::<ButtonInput<MouseButton>>().press(MouseButton::Right);
+        assert!(is_taken(&mut world, 400.0));
+        world.resource_mut::<ButtonInput<MouseButton>>().press(MouseButton::Left);
+        assert!(!is_taken(&mut world, 400.0));
+    }
+
+    /// What egui tells of a frame of one field, or number, at the top left, with what is done in it.
+    fn told(context: &egui::Context, shows: fn(&mut egui::Ui), events: Vec<egui::Event>) -> [bool; 2] {
+        let size = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(400.0, 300.0));
+        let input = egui::RawInput { screen_rect: Some(size), events, ..Default::default() };
+        let mut told = [false; 2];
+        let output = context.run_ui(input, |ui| {
+            shows(ui);
+            let edited = ui.ctx().output(|output| output.events.iter().any(enters));
+            told = [edited, ui.ctx().egui_wants_keyboard_input()];
+        });
+        output.drop_without_applying_deltas();
+        told
+    }
+
+    #[test]
+    fn texts_and_numbers_that_are_clicked_are_entered_and_buttons_are_not() {
+        let click = |pressed| egui::Event::PointerButton {
+            pos: egui::pos2(10.0, 9.0),
+            button: egui::PointerButton::Primary,
+            pressed,
+            modifiers: egui::Modifiers::NONE,
+        };
+        let shows: [(fn(&mut egui::Ui), bool); 3] = [
+            (|ui| drop(ui.add(egui::TextEdit::singleline(&mut String::new()))), true),
+            (|ui| drop(ui.add(egui::DragValue::new(&mut 1.0))), true),
+            (|ui| drop(ui.add(egui::Button::new("button"))), false),
+        ];
+        for (index, (show, is_entered)) in shows.into_iter().enumerate() {
+            let context = egui::Context::default();
+            let moved = egui::Event::PointerMoved(egui::pos2(10.0, 9.0));
+            assert_eq!(told(&context, show, vec![]), [false; 2], "{index}");
+            assert_eq!(told(&context, show, vec![moved]), [false; 2], "{index}");
+            // Within one frame.
+            assert_eq!(told(&context, show, vec![click(true), click(false)]), [is_entered; 2], "{index}");
+        }
+    }
 
     #[test]
     fn panels_are_turned_over_in_a_ring() {

@@ -14,7 +14,8 @@ use bevy_weathering::wetting::SurfaceWater;
 
 use super::added::Done;
 use super::record;
-use super::ui::{Note, keyboard_is_free};
+use super::shortcuts::Shortcuts;
+use super::ui::Note;
 
 /// Bytes of all that is kept.
 const ROOM: usize = 256 << 20;
@@ -119,15 +120,13 @@ impl Undo {
 
 pub fn plugin(app: &mut App) {
     app.init_resource::<Undo>()
-        .add_systems(Update, press.run_if(keyboard_is_free))
+        .add_systems(Update, press)
         // Before anything new is painted on what begins anew.
         .add_systems(PreUpdate, forget);
 }
 
-fn press(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
-    // Also where a slow frame has seen it pressed and let go of.
-    let control = [KeyCode::ControlLeft, KeyCode::ControlRight];
-    if (keys.any_pressed(control) || keys.any_just_pressed(control)) && keys.just_pressed(KeyCode::KeyZ) {
+fn press(keys: Res<Shortcuts>, mut commands: Commands) {
+    if keys.with_control(KeyCode::KeyZ) {
         commands.queue(undo);
     }
 }

@@ -14,7 +14,7 @@ use bevy::tasks::{Task, block_on};
 use bevy_weathering::export::ColorReadback;
 use bevy_weathering::save::{SaveError, SavedScene};
 
-use super::ui::{Note, keyboard_is_free};
+use super::ui::Note;
 
 pub use panel::show;
 pub use steps::{give_up_moment, keep_moment};
@@ -60,7 +60,7 @@ enum Step {
 pub fn plugin(app: &mut App) {
     app.init_resource::<panel::Folder>()
         .init_resource::<Saving>()
-        .add_systems(Update, (panel::press.run_if(keyboard_is_free), steps::advance).chain());
+        .add_systems(Update, (panel::press, steps::advance).chain());
 }
 
 impl Saving {
@@ -128,13 +128,14 @@ mod tests {
     use bevy::window::WindowCloseRequested;
 
     use super::super::leave;
+    use super::super::shortcuts::Shortcuts;
     use super::super::ui::{Help, UiInput};
     use super::*;
 
     fn app() -> App {
         let mut app = App::new();
         app.add_message::<WindowCloseRequested>()
-            .init_resource::<ButtonInput<KeyCode>>()
+            .init_resource::<Shortcuts>()
             .init_resource::<UiInput>()
             .init_resource::<Help>()
             .init_resource::<Note>()
@@ -183,7 +184,7 @@ mod tests {
     fn escape_closes_a_list_that_is_in_front_before_it_leaves() {
         let mut app = app();
         app.insert_resource(UiInput { popup: true, ..default() });
-        app.world_mut().resource_mut::<ButtonInput<KeyCode>>().press(KeyCode::Escape);
+        app.insert_resource(Shortcuts::of(KeyCode::Escape));
         app.update();
         assert_eq!(app.should_exit(), None);
         app.insert_resource(UiInput::default());

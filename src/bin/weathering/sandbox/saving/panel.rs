@@ -8,6 +8,7 @@ use bevy_weathering::record::Recording;
 use bevy_weathering::scenario::ScenarioStatus;
 
 use super::super::export;
+use super::super::shortcuts::Shortcuts;
 use super::super::shots::OutFolder;
 use super::super::split::Split;
 use super::super::ui::Note;
@@ -19,10 +20,8 @@ use super::steps::{begin, begin_restoring};
 #[derive(Resource, Default)]
 pub(super) struct Folder(Option<String>);
 
-pub(super) fn press(keys: Res<ButtonInput<KeyCode>>, mut commands: Commands) {
-    // Also where a slow frame has seen it pressed and let go of.
-    let control = [KeyCode::ControlLeft, KeyCode::ControlRight];
-    if (keys.any_pressed(control) || keys.any_just_pressed(control)) && keys.just_pressed(KeyCode::KeyS) {
+pub(super) fn press(keys: Res<Shortcuts>, mut commands: Commands) {
+    if keys.with_control(KeyCode::KeyS) {
         commands.queue(save);
     }
 }
