@@ -149,7 +149,7 @@ fn edit(ui: &mut egui::Ui, effect: &mut WeatherEffect) {
     carries(ui, &mut effect.carries);
     number(
         ui,
-        "volume, mm3",
+        "volume, mm³",
         &mut effect.volume_mm3,
         (0.0, 10_000.0),
         "Of a particle, if its emitter has no flow of its own",
@@ -166,7 +166,13 @@ fn edit(ui: &mut egui::Ui, effect: &mut WeatherEffect) {
         effect.terminal_speed = is_given.then_some(9.0);
     }
     if let Some(speed) = &mut effect.terminal_speed {
-        number(ui, "v_t, m/s", speed, (0.0, 100.0), "At which drag balances gravity; 0 is no drag, no wind");
+        number(
+            ui,
+            "terminal v_t, m/s",
+            speed,
+            (0.0, 100.0),
+            "At which drag balances gravity; 0 is no drag, no wind",
+        );
     }
     number(ui, "gravity", &mut effect.gravity_scale, (-2.0, 2.0), "Multiplies gravity");
     number(ui, "flutter, m/s", &mut effect.flutter, (0.0, 10.0), "Swaying in still air");

@@ -30,6 +30,8 @@ const EVERY: f32 = 0.5;
 const MOST_FILM_MM: f32 = 0.5;
 /// How much of the surface the cover hides, 0..=255.
 const OPACITY: u8 = 225;
+/// Pieces of the colours that are shown beside their meaning.
+const STEPS: usize = 24;
 /// So that it lies on its surface, and not in it.
 const DEPTH_BIAS: f32 = 8.0;
 
@@ -65,14 +67,54 @@ pub fn show(ui: &mut egui::Ui, world: &mut World) {
     }
     match shade {
         Shade::Off => {}
-        Shade::Wetness | Shade::Saturation => {
-            ui.small("black is none, white is all");
-        }
-        Shade::Film => {
-            ui.small(format!("black is none, white is {MOST_FILM_MM} mm or more"));
-        }
+        Shade::Wetness | Shade::Saturation => ramp(ui, "0", "100 %"),
+        Shade::Film => ramp(ui, "0", &format!("{MOST_FILM_MM} mm or more")),
         Shade::Source => sources::legend(ui, world),
     }
+}
+
+/// What the colours in the scene stand for, in its upper left corner: nobody has to know which panel has it.
+pub fn show_key(context: &egui::Context, free: egui::Rect, world: &World) {
+    let shade = world.resource::<Settings>().views.shade;
+    let name = match shade {
+        Shade::Off => return,
+        Shade::Wetness => "how wet surfaces look",
+        Shade::Film => "water on surfaces",
+        Shade::Saturation => "how full pores are",
+        Shade::Source => "where water came from",
+    };
+    let area = egui::Area::new("shades".into()).interactable(false).order(egui::Order::Middle);
+    area.fixed_pos(free.left_top() + egui::vec2(10.0, 10.0)).show(context, |ui| {
+        egui::Frame::popup(ui.style()).show(ui, |ui| {
+            ui.set_max_width((free.width() - 40.0).max(120.0));
+            ui.label(format!("false colours: {name} (V: next)"));
+            match shade {
+                Shade::Off => {}
+                Shade::Source => sources::legend(ui, world),
+                Shade::Film => ramp(ui, "0", &format!("{MOST_FILM_MM} mm or more")),
+                Shade::Wetness | Shade::Saturation => ramp(ui, "0", "100 %"),
+            }
+        });
+    });
+}
+
+/// The colours from nothing to all, between what the two ends are.
+pub fn ramp(ui: &mut egui::Ui, least: &str, most: &str) {
+    ui.horizontal(|ui| {
+        ui.small(least);
+        let (rect, _) = ui.allocate_exact_size(egui::vec2(96.0, 10.0), egui::Sense::hover());
+        let step = rect.width() / STEPS as f32;
+        for index in 0..STEPS {
+            let left = rect.left() + step * index as f32;
+            let piece =
+                egui::Rect::from_min_size(egui::pos2(left, rect.top()), egui::vec2(step, rect.height()));
+            let colour = maps::colour((index as f32 + 0.5) / STEPS as f32);
+            ui.painter().rect_filled(piece, 0.0, colour);
+        }
+        let line = egui::Stroke::new(1.0, egui::Color32::GRAY);
+        ui.painter().rect_stroke(rect, 0.0, line, egui::StrokeKind::Outside);
+        ui.small(most);
+    });
 }
 
 type Coverable =
