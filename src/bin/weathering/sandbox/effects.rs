@@ -95,6 +95,7 @@ fn in_use(world: &mut World) -> Vec<(String, Handle<WeatherEffect>)> {
             let name = named(&row.handle).unwrap_or_else(|| match index {
                 0 => "drips".into(),
                 1 => "lumps of snow".into(),
+                2 => "drips of mud".into(),
                 _ => format!("effect {index}"),
             });
             (name, row.handle.clone())
@@ -106,7 +107,12 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     let all = in_use(world);
     let mut chosen = world.resource::<Edited>().0;
     if !all.iter().any(|(_, handle)| Some(handle.id()) == chosen) {
-        chosen = all.last().map(|(_, handle)| handle.id());
+        // What somebody sends out, and only without that what surfaces shed.
+        let mut emitters = world.query::<&Emitter>();
+        let mut sent =
+            |effect: &Handle<WeatherEffect>| emitters.iter(world).any(|emitter| emitter.effect == *effect);
+        let first = all.iter().position(|(_, handle)| sent(handle)).unwrap_or(0);
+        chosen = all.get(first).map(|(_, handle)| handle.id());
     }
     let Some((name, handle)) = all.iter().find(|(_, handle)| Some(handle.id()) == chosen) else {
         ui.label("Nothing is in use yet.");

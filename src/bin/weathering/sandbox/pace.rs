@@ -114,10 +114,9 @@ pub fn start_over(world: &mut World) {
 
 fn show(ui: &mut egui::Ui, world: &mut World) {
     let is_ready = matches!(*world.resource::<ScenarioStatus>(), ScenarioStatus::Ready);
+    // They stay where they are: a bar of another height would move all panels below it.
     if !is_ready {
-        ui.spinner();
-        ui.label("loading");
-        return;
+        ui.disable();
     }
     let goes_on_later =
         record::goes_on_later(world) || saving::goes_on_later(world) || export::goes_on_later(world);

@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::visibility::RenderLayers;
-use bevy::image::{ImageAddressMode, ImageSampler, ImageSamplerDescriptor};
+use bevy::image::{ImageAddressMode, ImageFilterMode, ImageSampler, ImageSamplerDescriptor};
 use bevy::light::NotShadowCaster;
 use bevy::mesh::UvChannel;
 use bevy::prelude::*;
@@ -187,11 +187,17 @@ fn picture(wrap: [Wrap; 2]) -> Image {
         Wrap::Repeat => ImageAddressMode::Repeat,
         Wrap::Clamp => ImageAddressMode::ClampToEdge,
     });
-    // A source is one or the other, and nothing in between.
-    let nearest = ImageSamplerDescriptor::nearest();
-    image.sampler =
-        ImageSampler::Descriptor(ImageSamplerDescriptor { address_mode_u, address_mode_v, ..nearest });
+    image.sampler = ImageSampler::Descriptor(ImageSamplerDescriptor {
+        address_mode_u,
+        address_mode_v,
+        ..ImageSamplerDescriptor::linear()
+    });
     image
+}
+
+/// How what lies between two samples is seen: a source is one or the other, of an amount there is something in between.
+fn filter(shade: Shade) -> ImageFilterMode {
+    if shade == Shade::Source { ImageFilterMode::Nearest } else { ImageFilterMode::Linear }
 }
 
 /// Reads a surface into the picture of its cover.
@@ -213,6 +219,9 @@ fn paint(
     let surface = surface.parent();
     let Ok((water, geometry)) = surfaces.get(surface) else { return };
     let Some(mut image) = images.get_mut(&cover.image) else { return };
+    if let ImageSampler::Descriptor(sampler) = &mut image.sampler {
+        [sampler.mag_filter, sampler.min_filter] = [filter(shade); 2];
+    }
     let Some(data) = &mut image.data else { return };
     for (pixel, index) in data.chunks_exact_mut(4).zip(0u32..) {
         let uv = (Vec2::new((index % SIDE) as f32, (index / SIDE) as f32) + 0.5) / SIDE as f32;
@@ -259,5 +268,7 @@ mod tests {
         let ImageSampler::Descriptor(sampler) = image.sampler else { panic!("it has a sampler of its own") };
         assert!(matches!(sampler.address_mode_u, ImageAddressMode::Repeat));
         assert!(matches!(sampler.address_mode_v, ImageAddressMode::ClampToEdge));
+        assert!(matches!(filter(Shade::Source), ImageFilterMode::Nearest));
+        assert!(matches!(filter(Shade::Film), ImageFilterMode::Linear));
     }
 }
