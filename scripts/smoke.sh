@@ -139,15 +139,14 @@ xdotool key ctrl+z
 await "the stroke to be taken back" 30 grep -q "took a stroke back" "${scratch}/log"
 shot "a stroke taken back"
 
-# Probe, maps, plots; then all panels by their tabs, in the first two rows at the left.
+# Probe, maps, plots; then all panels in turn, by their key: where tabs are depends on how wide the window is.
 xdotool key i mousemove 640 360 click 1 key m key p
 shot "maps and plots"
 xdotool key v
 shot "how wet surfaces are, in false colours"
 xdotool key v key v key v key v
-for tab in '90 43' '150 43' '220 43' '292 43' '36 70' '104 70' '170 70' '221 70' '282 70' '36 43'; do
-    read -r x y <<<"${tab}"
-    xdotool mousemove "${x}" "${y}" click 1
+for _ in 1 2 3 4 5 6 7 8 9 10; do
+    xdotool key Next
     sleep 0.4
     alive "opening panels"
 done

@@ -121,6 +121,8 @@ fn a_brush_wets_what_is_under_the_mouse_and_a_stroke_is_taken_back() {
         sandbox.xdotool(&["key", "ctrl+z"]);
         (darker_part(&sandbox.picture(), &dry) < 0.1 * darkest).then_some(())
     });
+    // What was painted is not saved: that is told first.
+    sandbox.answer("Escape once more leaves", |sandbox| sandbox.key("Escape"));
     sandbox.key("Escape");
     let status = sandbox.end();
     assert!(status.success(), "{status}");

@@ -102,6 +102,8 @@ fn maps_and_the_probe_tell_of_a_stroke_and_of_a_jet_and_the_stroke_is_taken_back
         found.contains("water from hose").then_some(found)
     });
     assert!(water(&wet) > 0.0 && number(&wet, "wet since ") < 600.0, "{wet}");
+    // What was painted is not saved: that is told first.
+    sandbox.answer("Escape once more leaves", |sandbox| sandbox.key("Escape"));
     sandbox.key("Escape");
     let status = sandbox.end();
     assert!(status.success(), "{status}");

@@ -42,8 +42,8 @@ pub fn show(ui: &mut egui::Ui, world: &mut World) {
     let drawn = world.resource::<Boxes>().drawn;
     let mut settings = world.resource_mut::<Settings>();
     let views = &mut settings.views;
-    ui.checkbox(&mut views.boxes, "boxes")
-        .on_hover_text("Of the BVHs: around each surface, and around all of them");
+    ui.checkbox(&mut views.boxes, "BVH boxes")
+        .on_hover_text("What is looked through for hits: around each surface, and within it");
     if !views.boxes {
         return;
     }

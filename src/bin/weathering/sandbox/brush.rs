@@ -35,7 +35,7 @@ pub fn plugin(app: &mut App) {
 
 impl Tool {
     /// What it does, if it is a brush.
-    fn brush(self) -> Option<BrushKind> {
+    pub fn brush(self) -> Option<BrushKind> {
         match self {
             Self::Wet => Some(BrushKind::Wet),
             Self::Dry => Some(BrushKind::Dry),
@@ -123,6 +123,7 @@ fn draw(
 fn show(ui: &mut egui::Ui, world: &mut World) {
     let mut settings = world.resource_mut::<Settings>();
     let settings = &mut *settings;
+    ui.label("Choose one, and hold the left button in the scene.");
     ui.horizontal_wrapped(|ui| {
         for (tool, name, about) in [
             (Tool::Wet, "Wet", "Brings water (1)"),

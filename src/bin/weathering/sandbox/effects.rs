@@ -95,6 +95,7 @@ fn in_use(world: &mut World) -> Vec<(String, Handle<WeatherEffect>)> {
             let name = named(&row.handle).unwrap_or_else(|| match index {
                 0 => "drips".into(),
                 1 => "lumps of snow".into(),
+                2 => "drips of mud".into(),
                 _ => format!("effect {index}"),
             });
             (name, row.handle.clone())
@@ -106,7 +107,12 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     let all = in_use(world);
     let mut chosen = world.resource::<Edited>().0;
     if !all.iter().any(|(_, handle)| Some(handle.id()) == chosen) {
-        chosen = all.last().map(|(_, handle)| handle.id());
+        // What somebody sends out, and only without that what surfaces shed.
+        let mut emitters = world.query::<&Emitter>();
+        let mut sent =
+            |effect: &Handle<WeatherEffect>| emitters.iter(world).any(|emitter| emitter.effect == *effect);
+        let first = all.iter().position(|(_, handle)| sent(handle)).unwrap_or(0);
+        chosen = all.get(first).map(|(_, handle)| handle.id());
     }
     let Some((name, handle)) = all.iter().find(|(_, handle)| Some(handle.id()) == chosen) else {
         ui.label("Nothing is in use yet.");
@@ -149,7 +155,7 @@ fn edit(ui: &mut egui::Ui, effect: &mut WeatherEffect) {
     carries(ui, &mut effect.carries);
     number(
         ui,
-        "volume, mm3",
+        "volume, mm³",
         &mut effect.volume_mm3,
         (0.0, 10_000.0),
         "Of a particle, if its emitter has no flow of its own",
@@ -166,7 +172,13 @@ fn edit(ui: &mut egui::Ui, effect: &mut WeatherEffect) {
         effect.terminal_speed = is_given.then_some(9.0);
     }
     if let Some(speed) = &mut effect.terminal_speed {
-        number(ui, "v_t, m/s", speed, (0.0, 100.0), "At which drag balances gravity; 0 is no drag, no wind");
+        number(
+            ui,
+            "terminal v_t, m/s",
+            speed,
+            (0.0, 100.0),
+            "At which drag balances gravity; 0 is no drag, no wind",
+        );
     }
     number(ui, "gravity", &mut effect.gravity_scale, (-2.0, 2.0), "Multiplies gravity");
     number(ui, "flutter, m/s", &mut effect.flutter, (0.0, 10.0), "Swaying in still air");

@@ -32,7 +32,7 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
         ui.label(format!("{} not sent: at most {most} may be in flight", counts.refused));
     }
     if counts.merged > 0 {
-        ui.label(format!("{} not sent: others carry what they would", counts.merged));
+        ui.label(format!("{} fewer were sent, each with more in it, to keep up", counts.merged));
     }
     added::show(ui, world);
     let mut query =
@@ -188,17 +188,16 @@ fn shape(ui: &mut egui::Ui, shape: &mut EmitterShape) {
         EmitterShape::Cone { radius } => number(ui, "nozzle radius, m", radius, (0.001, 0.5), ""),
         EmitterShape::Disc { radius } => number(ui, "radius, m", radius, (0.001, 20.0), ""),
         EmitterShape::Box { half_size } => {
-            for (label, value) in ["half x, m", "half y, m", "half z, m"].into_iter().zip([
-                &mut half_size.x,
-                &mut half_size.y,
-                &mut half_size.z,
-            ]) {
+            for (label, value) in ["half length x, m", "half length y, m", "half length z, m"]
+                .into_iter()
+                .zip([&mut half_size.x, &mut half_size.y, &mut half_size.z])
+            {
                 number(ui, label, value, (0.0, 20.0), "");
             }
         }
         EmitterShape::Sky { half_size } => {
-            number(ui, "half x, m", &mut half_size.x, (0.01, 100.0), "Along x");
-            number(ui, "half z, m", &mut half_size.y, (0.01, 100.0), "Along z");
+            number(ui, "half length x, m", &mut half_size.x, (0.01, 100.0), "Along x");
+            number(ui, "half length z, m", &mut half_size.y, (0.01, 100.0), "Along z");
         }
     }
 }

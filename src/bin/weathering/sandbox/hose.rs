@@ -3,15 +3,19 @@
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_egui::egui;
+use bevy_weathering::collision::CollisionScene;
+use bevy_weathering::effect::WeatherEffect;
 use bevy_weathering::emitter::Emitter;
+use bevy_weathering::particle::Forces;
 use bevy_weathering::record::{ExtraEmitter, Recording};
 use bevy_weathering::scenario::{EmitterKey, EmitterSpec};
 
+use super::aim::Flight;
 use super::camera::View;
 use super::settings::{HoseSettings, Settings, Tool};
 use super::ui::{AddPanel, Place, UiInput};
 use super::widgets::number;
-use super::{effects, shortcuts};
+use super::{effects, probe, shortcuts};
 
 /// Number of its random stream: behind those of any scenario.
 const STREAM: u32 = u32::MAX;
@@ -71,27 +75,32 @@ fn spray(
     pointed: Res<Pointed>,
     settings: Res<Settings>,
     recording: Option<Res<Recording>>,
+    scene: Res<CollisionScene>,
+    known: (Res<Assets<WeatherEffect>>, Res<Forces>),
     mut commands: Commands,
     mut hoses: Query<(&mut Emitter, &mut Transform, &mut GlobalTransform), With<InHand>>,
     mut was_open: Local<bool>,
 ) {
     let is_open = pointed.held && settings.tool == Tool::Hose;
-    let aim = pointed.ray.filter(|_| is_open).map(aimed);
+    let ray = pointed.ray.filter(|_| is_open);
     let is_let_go = std::mem::replace(&mut *was_open, is_open) && !is_open;
     // What was recorded is not interfered with while it runs again.
     if !is_open && !is_let_go && recording.is_some_and(|recording| !recording.is_at_end()) {
         return;
     }
     let Ok((mut emitter, mut transform, mut global)) = hoses.single_mut() else {
-        if let Some(aim) = aim {
-            commands.queue(move |world: &mut World| take(world, aim));
+        if let Some(ray) = ray {
+            commands.queue(move |world: &mut World| take(world, ray));
         }
         return;
     };
     if emitter.enabled != is_open {
         emitter.enabled = is_open;
     }
-    if let Some(aim) = aim {
+    if let Some(ray) = ray {
+        let (effects, forces) = known;
+        let flight = Flight::new(&emitter, effects.get(&emitter.effect), &forces);
+        let aim = aimed_at(ray, &scene, flight);
         *transform = aim;
         // Ticks come before transforms are propagated.
         *global = GlobalTransform::from(aim);
@@ -103,6 +112,15 @@ pub fn aimed(ray: Ray3d) -> Transform {
     let eye = Transform::from_translation(ray.origin).looking_to(ray.direction, Vec3::Y);
     let hand = ray.origin + eye.right() * 0.12 - eye.up() * 0.1;
     eye.with_translation(hand).looking_at(ray.origin + ray.direction * 4.0, Vec3::Y)
+}
+
+/// The same, pointing so that what flies like this comes down at what the ray hits; straight ahead where it hits nothing.
+fn aimed_at(ray: Ray3d, scene: &CollisionScene, flight: Flight) -> Transform {
+    let straight = aimed(ray);
+    match probe::hit(scene, ray) {
+        Some(hit) => straight.looking_to(flight.aim(straight.translation, hit.point), Vec3::Y),
+        None => straight,
+    }
 }
 
 /// The hose as an emitter of a recorded scenario; off.
@@ -127,12 +145,15 @@ pub fn to_record(settings: &HoseSettings) -> Option<ExtraEmitter> {
 }
 
 /// A hose as the settings have it.
-fn take(world: &mut World, aim: Transform) {
+fn take(world: &mut World, ray: Ray3d) {
     let settings = world.resource::<Settings>().hose.clone();
     let Some(effect) = effects::shipped(world, &settings.effect) else { return };
     let mut emitter = Emitter { stream: STREAM, lifetime: 6.0, ..default() };
     set(&mut emitter, &settings);
     emitter.effect = effect;
+    let effect = world.resource::<Assets<WeatherEffect>>().get(&emitter.effect);
+    let flight = Flight::new(&emitter, effect, world.resource::<Forces>());
+    let aim = aimed_at(ray, world.resource::<CollisionScene>(), flight);
     world.spawn((Name::new(NAME), InHand, emitter, aim, GlobalTransform::from(aim)));
 }
 
@@ -155,9 +176,21 @@ fn show_tools(ui: &mut egui::Ui, world: &mut World) {
     ui.selectable_value(&mut settings.tool, Tool::Hose, "Hose").on_hover_text("Left button: spray (H)");
     ui.selectable_value(&mut settings.tool, Tool::Probe, "Probe")
         .on_hover_text("Left button: how wet it is (I)");
-    let fly = if settings.flies { "Fly" } else { "Orbit" };
-    if ui.button(fly).on_hover_text("What the right button does to the camera (C)").clicked() {
-        settings.flies = !settings.flies;
+    let is_brush = settings.tool.brush().is_some();
+    let about = "Left button: paint; wet, dry, dirty or clean (1 to 4)";
+    if ui.selectable_label(is_brush, "Brush").on_hover_text(about).clicked() {
+        if !is_brush {
+            settings.tool = Tool::Wet;
+        }
+        // Which of them, how large and how strong.
+        settings.panel = "Brushes".into();
+    }
+    ui.separator();
+    for (flies, name, about) in [
+        (false, "Orbit", "Right button: turn around what is looked at (C)"),
+        (true, "Fly", "Right button: look around; W A S D Q E fly (C)"),
+    ] {
+        ui.selectable_value(&mut settings.flies, flies, name).on_hover_text(about);
     }
 }
 

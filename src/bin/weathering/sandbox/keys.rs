@@ -16,7 +16,7 @@ const KEYS: &[(&str, &str)] = &[
     ("Middle button", "move the camera"),
     ("Wheel", "closer, farther; faster, slower in flight"),
     ("W A S D Q E", "fly (Shift: faster)"),
-    ("C", "orbit or flight"),
+    ("C", "right button: orbit or fly"),
     ("F", "look at all of the scene"),
     ("H, I", "hose, probe"),
     ("1 2 3 4", "brushes: wet, dry, dirty, clean"),
@@ -29,14 +29,17 @@ const KEYS: &[(&str, &str)] = &[
     ("U", "hide panels, show them"),
     ("M, P", "maps, plots"),
     ("PageUp PageDown", "the panel before, after"),
-    ("V", "what surfaces show: look, wetness, film, saturation, source"),
+    ("V", "false colours: wetness, film, saturation, source"),
     ("X", "export the scene as it is"),
     ("F9", "record a session; write it and end"),
     ("F12", "picture"),
     ("F11", "begin, end a sequence of pictures"),
     ("? or F1", "this list"),
-    ("Escape", "close this list; leave"),
+    ("Escape", "close this list; leave (twice, if not saved)"),
 ];
+
+/// Width of a column of the list, points.
+const COLUMN: f32 = 430.0;
 
 pub fn plugin(app: &mut App) {
     app.add_systems(Update, reset)
@@ -90,18 +93,30 @@ fn choose(keys: Res<Shortcuts>, mut settings: ResMut<Settings>, mut help: ResMut
     }
 }
 
-/// The list of all keys.
+/// The list of all keys, in two columns where there is room for them.
 pub fn show_help(context: &egui::Context, open: &mut bool) {
+    let screen = context.viewport_rect();
+    let columns = if screen.width() >= 2.0 * COLUMN + 60.0 { 2 } else { 1 };
     // Where panels are large, the list is longer than the window is high.
-    let most = (context.viewport_rect().height() - 110.0).max(80.0);
-    let window = egui::Window::new("Keys").open(open).resizable(false).default_pos([340.0, 60.0]);
+    let most = (screen.height() - 110.0).max(80.0);
+    let width = (COLUMN * columns as f32).min(screen.width() - 40.0);
+    let window = egui::Window::new("Keys").open(open).resizable(false).collapsible(false);
+    let window = window.pivot(egui::Align2::CENTER_CENTER).default_pos(screen.center()).default_width(width);
     window.show(context, |ui| {
+        // Bars that float are not seen before they are needed.
+        ui.spacing_mut().scroll = egui::style::ScrollStyle::solid();
         egui::ScrollArea::vertical().max_height(most).show(ui, |ui| {
-            egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
-                for (key, does) in KEYS {
-                    ui.strong(*key);
-                    ui.label(*does);
-                    ui.end_row();
+            ui.set_width(width);
+            ui.columns(columns, |uis| {
+                let lists = KEYS.chunks(KEYS.len().div_ceil(columns));
+                for ((index, list), ui) in lists.enumerate().zip(uis) {
+                    egui::Grid::new(("keys", index)).num_columns(2).striped(true).show(ui, |ui| {
+                        for (key, does) in list {
+                            ui.strong(*key);
+                            ui.label(*does);
+                            ui.end_row();
+                        }
+                    });
                 }
             });
         });

@@ -1,12 +1,17 @@
 //! Leaving: by the key, by the window's button, or because nothing can be drawn any more. Never while a scene is on its way to the
-//! disk.
+//! disk. The key is near others, and closes what is in front, too: where something would be lost it has to be pressed twice.
+
+use std::time::{Duration, Instant};
 
 use bevy::prelude::*;
 use bevy::render::error_handler::{RenderError, RenderErrorHandler, RenderErrorPolicy};
 use bevy::window::WindowCloseRequested;
 use bevy_weathering::replay::describe_render_error;
 
+use super::hose::Pointed;
+use super::open::Opened;
 use super::saving::Saving;
+use super::settings::{Settings, Tool};
 use super::shortcuts::Shortcuts;
 use super::ui::{Help, Note, UiInput};
 
@@ -14,20 +19,47 @@ use super::ui::{Help, Note, UiInput};
 #[derive(Resource, Default)]
 pub struct Leaving(pub bool);
 
+/// Whether something has been sprayed or painted that no saved scene has.
+#[derive(Resource, Default)]
+struct Unsaved(bool);
+
+/// How long the key is remembered to have been pressed.
+const PATIENCE: Duration = Duration::from_secs(15);
+
 pub fn plugin(app: &mut App) {
     app.init_resource::<Leaving>()
+        .init_resource::<Unsaved>()
         .insert_resource(RenderErrorHandler(give_up))
-        .add_systems(Update, (press, close).chain())
+        .add_systems(Update, (notice, press, close).chain())
         .add_systems(PostUpdate, leave)
         .add_systems(Last, finish_writing);
+}
+
+/// Follows whether there is something to lose.
+fn notice(
+    pointed: Res<Pointed>,
+    settings: Res<Settings>,
+    saving: Res<Saving>,
+    opened: Res<Opened>,
+    mut unsaved: ResMut<Unsaved>,
+) {
+    if pointed.pressed && settings.tool != Tool::Probe {
+        unsaved.0 = true;
+    }
+    if opened.is_changed() || saving.is_saving() {
+        unsaved.0 = false;
+    }
 }
 
 fn press(
     keys: Res<Shortcuts>,
     input: Res<UiInput>,
+    unsaved: Res<Unsaved>,
     mut help: ResMut<Help>,
+    mut note: ResMut<Note>,
     mut leaving: ResMut<Leaving>,
     mut exit: MessageWriter<AppExit>,
+    mut asked: Local<Option<Instant>>,
 ) {
     if !keys.pressed(KeyCode::Escape) || input.popup {
         return;
@@ -35,6 +67,9 @@ fn press(
     // What is in front goes first.
     if help.0 {
         help.0 = false;
+    } else if unsaved.0 && !leaving.0 && !asked.is_some_and(|asked| asked.elapsed() < PATIENCE) {
+        *asked = Some(Instant::now());
+        note.complain("Escape once more leaves; what was done is not saved (Ctrl+S)");
     } else {
         ask(&mut leaving, &mut exit);
     }

@@ -12,8 +12,8 @@ use bevy_weathering::wetting::{Exposure, SurfaceWater, TexelGeometry, WetGeometr
 
 use super::selection::{Selected, choose_surface};
 use super::settings::Settings;
-use super::sources;
 use super::ui::{AddPanel, Place};
+use super::{shades, sources};
 
 /// Samples along each side.
 const SIDE: usize = 128;
@@ -43,21 +43,22 @@ enum Channel {
 }
 
 impl Channel {
-    const ALL: [(Self, &'static str); 14] = [
-        (Self::Wetness, "looks wet"),
-        (Self::Film, "film"),
-        (Self::Absorbed, "absorbed"),
-        (Self::Saturation, "pores full"),
-        (Self::Since, "wet for"),
-        (Self::Source, "source"),
-        (Self::Dust, "dust"),
-        (Self::Mud, "mud"),
-        (Self::Snow, "snow"),
-        (Self::Air, "air"),
-        (Self::Sun, "sun"),
-        (Self::Colour, "colour"),
-        (Self::Gloss, "gloss"),
-        (Self::Normal, "normal"),
+    /// With their names, and what is seen in them.
+    const ALL: [(Self, &'static str, &'static str); 14] = [
+        (Self::Wetness, "looks wet", "How wet it looks: 0 is dry, 1 is soaked"),
+        (Self::Film, "film", "Water that lies on it, mm"),
+        (Self::Absorbed, "absorbed", "Water in its pores, mm"),
+        (Self::Saturation, "pores full", "Part of its pores that is full of water"),
+        (Self::Since, "wet for", "Seconds since it was dry"),
+        (Self::Source, "source", "Which emitter its water came from"),
+        (Self::Dust, "dust", "mm"),
+        (Self::Mud, "mud", "mm"),
+        (Self::Snow, "snow", "As much water as it melts to, mm"),
+        (Self::Air, "air", "How well air gets there, and dries: 1 is an even surface in the open"),
+        (Self::Sun, "sun", "How much of the sun gets there, and dries"),
+        (Self::Colour, "colour", "What marks have painted: colour"),
+        (Self::Gloss, "gloss", "What marks have painted: reflectance and smoothness"),
+        (Self::Normal, "normal", "What marks have painted: slopes"),
     ];
 
     /// The image on the GPU, for those that are painted.
@@ -232,8 +233,8 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     let Some(surface) = world.resource::<Selected>().0 else { return };
     let mut channel = world.resource::<MapView>().channel;
     ui.horizontal_wrapped(|ui| {
-        for (other, name) in Channel::ALL {
-            ui.selectable_value(&mut channel, other, name);
+        for (other, name, about) in Channel::ALL {
+            ui.selectable_value(&mut channel, other, name).on_hover_text(about);
         }
     });
     world.resource_mut::<MapView>().channel = channel;
@@ -292,7 +293,7 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
         return;
     }
     let unit = channel.unit();
-    ui.small(format!("white is {most:.3}{unit}"));
+    shades::ramp(ui, "0", &format!("{most:.3}{unit}"));
     if let Some((part, value)) = hovered {
         ui.label(format!("uv {:.3} {:.3}: {value:.4}{unit}", part.x, part.y));
     }
@@ -315,7 +316,7 @@ mod tests {
 
     #[test]
     fn every_map_has_a_name_and_a_unit() {
-        let names: std::collections::BTreeSet<_> = Channel::ALL.iter().map(|(_, name)| name).collect();
+        let names: std::collections::BTreeSet<_> = Channel::ALL.iter().map(|(_, name, _)| name).collect();
         assert_eq!(names.len(), Channel::ALL.len());
         let units = [Channel::Since, Channel::Film, Channel::Sun].map(Channel::unit);
         assert_eq!(units, [" s", " mm", ""]);

@@ -67,8 +67,8 @@ fn show_dry(ui: &mut egui::Ui, world: &mut World, surface: Entity) {
     ui.heading("Dry");
     ui.horizontal(|ui| {
         color(ui, &mut k_d);
-        ui.label("k_d")
-            .on_hover_text("Its colour; multiplies its texture. Surfaces of the same material share it");
+        ui.label("colour k_d")
+            .on_hover_text("Multiplies its texture. Surfaces of the same material share it");
     });
     let [roughness, reflectance, metalness] = &mut numbers;
     number(ui, "roughness", roughness, (0.0, 1.0), "Perceptual; multiplies its texture");
@@ -114,7 +114,7 @@ fn show_pores(ui: &mut egui::Ui, of: &mut PorousMaterial) {
     ui.heading("Water");
     parameter(
         ui,
-        "S, mm/min^1/2",
+        "sorptivity S, mm/min^½",
         "sorptivity",
         &mut of.sorptivity,
         Some(10.0),
@@ -122,11 +122,18 @@ fn show_pores(ui: &mut egui::Ui, of: &mut PorousMaterial) {
     );
     parameter(ui, "capacity, mm", "capacity_mm", &mut of.capacity_mm, Some(20.0), "Water that fits into it");
     parameter(ui, "visible, mm", "visible_mm", &mut of.visible_mm, Some(5.0), "Absorbed, looks fully wet");
-    parameter(ui, "theta_s", "pore_volume", &mut of.pore_volume, None, "Part of its volume that is pores");
-    parameter(ui, "film kept, mm", "retained_mm", &mut of.retained_mm, Some(2.0), "Does not run");
     parameter(
         ui,
-        "t_fill, s",
+        "pore volume θ_s",
+        "pore_volume",
+        &mut of.pore_volume,
+        None,
+        "Part of its volume that is pores",
+    );
+    parameter(ui, "film kept, mm", "retained_mm", &mut of.retained_mm, Some(2.0), "So much does not run");
+    parameter(
+        ui,
+        "time to fill t_fill, s",
         "t_fill",
         &mut of.t_fill,
         Some(30.0),
@@ -212,17 +219,38 @@ fn show_model(ui: &mut egui::Ui, material: &mut PorousMaterial) {
 
 fn show_hnat(ui: &mut egui::Ui, pores: &mut Pores) {
     let about = "Part of the surface that is pores";
-    parameter(ui, "alpha_poro", "model.alpha_poro", &mut pores.alpha_poro, None, about);
-    parameter(ui, "s_p", "model.s_p", &mut pores.s_p, None, "Shape of a pore: deep near 0, shallow at 1");
-    parameter(ui, "m", "model.m", &mut pores.m, None, "RMS slope between pores");
-    parameter(ui, "k_s", "model.k_s", &mut pores.k_s, None, "Light that is scattered back without entering");
-    parameter(ui, "k_w", "model.k_w", &mut pores.k_w, None, "Strength of the water's own reflection");
-    ui.checkbox(&mut pores.sqrt_k, "k = sqrt(2 m^2 / pi)").on_hover_text("Schlick; else as printed");
+    parameter(ui, "pore area α_poro", "model.alpha_poro", &mut pores.alpha_poro, None, about);
+    parameter(
+        ui,
+        "pore shape s_p",
+        "model.s_p",
+        &mut pores.s_p,
+        None,
+        "Shape of a pore: deep near 0, shallow at 1",
+    );
+    parameter(ui, "roughness m", "model.m", &mut pores.m, None, "RMS slope between pores");
+    parameter(
+        ui,
+        "scatters back k_s",
+        "model.k_s",
+        &mut pores.k_s,
+        None,
+        "Light that is scattered back without entering",
+    );
+    parameter(
+        ui,
+        "water reflects k_w",
+        "model.k_w",
+        &mut pores.k_w,
+        None,
+        "Strength of the water's own reflection",
+    );
+    ui.checkbox(&mut pores.sqrt_k, "k = sqrt(2 m² / π)").on_hover_text("Schlick; else as printed");
 }
 
 fn show_coated(ui: &mut egui::Ui, film: &mut Coated) {
     parameter(ui, "porosity", "model.porosity", &mut film.porosity, None, "Part that takes the film");
-    parameter(ui, "n_solid", "model.n_solid", &mut film.n_solid, None, "Refractive index of the solid");
+    parameter(ui, "index n_solid", "model.n_solid", &mut film.n_solid, None, "Refractive index of the solid");
 }
 
 fn show_standing(ui: &mut egui::Ui, water: &mut StandingWater) {

@@ -3,6 +3,7 @@
 //! Each file is a plugin of its own; those that have something to show add a panel to [`ui`].
 
 mod added;
+mod aim;
 mod boxes;
 mod brush;
 mod camera;

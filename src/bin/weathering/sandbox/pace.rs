@@ -111,10 +111,9 @@ pub fn start_over(world: &mut World) {
 
 fn show(ui: &mut egui::Ui, world: &mut World) {
     let is_ready = matches!(*world.resource::<ScenarioStatus>(), ScenarioStatus::Ready);
+    // They stay where they are: a bar of another height would move all panels below it.
     if !is_ready {
-        ui.spinner();
-        ui.label("loading");
-        return;
+        ui.disable();
     }
     let goes_on_later =
         record::goes_on_later(world) || saving::goes_on_later(world) || export::goes_on_later(world);
@@ -129,6 +128,9 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     if ui.button("Start over").on_hover_text("Dry, at the first tick (R)").clicked() {
         start_over(world);
     }
+    // There is little room in the bar.
+    ui.spacing_mut().slider_width = 80.0;
+    ui.label("speed");
     let mut speed = world.resource::<Time<Virtual>>().relative_speed_f64();
     let slider = egui::Slider::new(&mut speed, SPEEDS.0..=SPEEDS.1).logarithmic(true).suffix(" x");
     // Decimals that are cut off would count as changes.
@@ -137,13 +139,19 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     if slider.on_hover_text(about).changed() {
         world.resource_mut::<Time<Virtual>>().set_relative_speed_f64(speed.clamp(SPEEDS.0, SPEEDS.1));
     }
+    show_time(ui, world);
+}
+
+/// That the speed that was asked for is not reached. At the end of the bar: it comes and goes, and nothing is to move with it.
+pub fn show_load(ui: &mut egui::Ui, world: &World) {
+    let time = world.resource::<Time<Virtual>>();
     let part = world.resource::<LiveLoad>().speed;
-    if part < HELD_BACK && !is_paused {
-        let text = format!("held at {:.2} x", speed * f64::from(part));
+    let is_ready = matches!(*world.resource::<ScenarioStatus>(), ScenarioStatus::Ready);
+    if part < HELD_BACK && is_ready && !time.is_paused() {
+        let text = format!("held at {:.2} x", time.relative_speed_f64() * f64::from(part));
         let text = egui::RichText::new(text).color(theme::WARNING);
         ui.label(text).on_hover_text("Ticks, or drawing, take longer than there is time for");
     }
-    show_time(ui, world);
 }
 
 /// The time that is shown: the present, or another.
@@ -158,6 +166,7 @@ fn show_time(ui: &mut egui::Ui, world: &mut World) {
     let end = (now + 600.0).max(at) * 1.2;
     let slider = egui::Slider::new(&mut at, 0.0..=end).logarithmic(true).smallest_positive(1.0).suffix(" s");
     // Decimals that are cut off would count as changes.
+    ui.label("time");
     let slider = ui.add(slider.custom_formatter(|seconds, _| format!("{seconds:.1}")));
     let slider =
         slider.on_hover_text("The time that is shown: as it was, and as it will be if nothing happens");

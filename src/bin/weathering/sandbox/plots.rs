@@ -11,7 +11,7 @@ use bevy_weathering::overlay::SplatStats;
 use bevy_weathering::overload::{STAGES, StageMark, StageMeans, StageTimes};
 use bevy_weathering::particle::{ParticleCounts, WaterCounts};
 use bevy_weathering::wetting::{SurfaceWater, WettingStats};
-use egui_plot::{Legend, Line, Plot, PlotPoints};
+use egui_plot::{Line, Plot, PlotPoints};
 
 use super::settings::Settings;
 use super::ui::{AddPanel, Place};
@@ -66,6 +66,17 @@ const CHARTS: [(Chart, &str); 4] = [
     (Chart::Water, "water"),
 ];
 
+/// Of the lines of a chart, in their order.
+const COLOURS: [egui::Color32; 7] = [
+    egui::Color32::from_rgb(240, 120, 110),
+    egui::Color32::from_rgb(110, 170, 240),
+    egui::Color32::from_rgb(150, 205, 95),
+    egui::Color32::from_rgb(220, 130, 220),
+    egui::Color32::from_rgb(90, 205, 190),
+    egui::Color32::from_rgb(235, 185, 80),
+    egui::Color32::from_rgb(170, 140, 245),
+];
+
 /// The samples of the last minute.
 #[derive(Resource)]
 struct History {
@@ -109,8 +120,15 @@ impl History {
         self.samples.push_back((at, values));
     }
 
+    /// By seconds before the last sample.
     fn line(&self, index: usize) -> PlotPoints<'static> {
-        self.samples.iter().map(|(at, values)| [*at, values[index]]).collect()
+        let last = self.samples.back().map_or(0.0, |(at, _)| *at);
+        self.samples.iter().map(|(at, values)| [*at - last, values[index]]).collect()
+    }
+
+    /// What was measured last.
+    fn last(&self, index: usize) -> f64 {
+        self.samples.back().map_or(0.0, |(_, values)| values[index])
     }
 }
 
@@ -208,9 +226,14 @@ fn measure(
 
 fn show(ui: &mut egui::Ui, world: &mut World) {
     let mut shown = world.resource::<Settings>().charts;
-    ui.horizontal(|ui| {
+    let room = ((ui.available_width() / NARROWEST) as usize).max(1);
+    ui.horizontal_wrapped(|ui| {
         for (index, (_, name)) in CHARTS.into_iter().enumerate() {
             ui.toggle_value(&mut shown[index], name);
+        }
+        let chosen = shown.iter().filter(|is_shown| **is_shown).count();
+        if chosen > room {
+            ui.small(format!("there is room for {room} of {chosen}"));
         }
     });
     if world.resource::<Settings>().charts != shown {
@@ -218,33 +241,46 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     }
     let mut charts: Vec<_> = CHARTS.into_iter().zip(shown).filter(|(_, is_shown)| *is_shown).collect();
     // Better fewer than none that can be read.
-    charts.truncate(((ui.available_width() / NARROWEST) as usize).max(1));
+    charts.truncate(room);
     if charts.is_empty() {
         return;
     }
     let history = world.resource::<History>();
-    let height = ui.available_height();
     ui.columns(charts.len(), |columns| {
         for (column, ((chart, name), _)) in columns.iter_mut().zip(charts) {
-            // Small, and in the order of the lines: charts are narrow beside open panels.
-            let legend = Legend::default()
-                .text_style(egui::TextStyle::Small)
-                .background_alpha(0.6)
-                .follow_insertion_order(true);
+            let lines = LINES.iter().enumerate().filter(|(_, (_, of))| *of == chart);
+            let lines: Vec<_> =
+                lines.zip(COLOURS).map(|((index, (name, _)), colour)| (index, *name, colour)).collect();
+            // Above the lines, and not on them: charts are narrow beside open panels.
+            column.horizontal_wrapped(|ui| {
+                for &(index, name, colour) in &lines {
+                    let text = egui::RichText::new(format!("{name}: {}", short(history.last(index))));
+                    ui.label(text.small().color(colour));
+                }
+            });
             let plot = Plot::new(name)
-                .height(height)
-                .legend(legend)
+                .height(column.available_height().max(40.0))
                 .include_y(0.0)
                 .allow_scroll(false)
                 .allow_drag(false)
                 .allow_zoom(false)
-                .x_axis_label("s");
-            let lines = LINES.iter().enumerate().filter(|(_, (_, of))| *of == chart);
-            let lines: Vec<_> =
-                lines.map(|(index, (name, _))| Line::new(*name, history.line(index))).collect();
+                .x_axis_formatter(|mark, _| format!("{:.0} s", mark.value));
+            let lines: Vec<_> = lines
+                .into_iter()
+                .map(|(index, name, colour)| Line::new(name, history.line(index)).color(colour))
+                .collect();
             plot.show(column, |plot| lines.into_iter().for_each(|line| plot.line(line)));
         }
     });
+}
+
+/// As many digits as say something.
+fn short(value: f64) -> String {
+    match value.abs() {
+        size if size >= 100.0 => format!("{value:.0}"),
+        size if size >= 1.0 => format!("{value:.1}"),
+        _ => format!("{value:.2}"),
+    }
 }
 
 #[cfg(test)]
@@ -259,7 +295,10 @@ mod tests {
         }
         assert_eq!(history.samples.len(), KEPT);
         assert_eq!(history.samples.front().map(|(at, _)| *at), Some(50.0));
-        assert_eq!(history.line(0).points().len(), KEPT);
+        let points = history.line(0);
+        let ends = [points.points().first(), points.points().last()].map(|point| point.map(|point| point.x));
+        assert_eq!((points.points().len(), ends), (KEPT, [Some(1.0 - KEPT as f64), Some(0.0)]));
+        assert_eq!((history.last(3), History::default().last(3)), ((KEPT + 49) as f64, 0.0));
     }
 
     #[test]
@@ -274,7 +313,11 @@ mod tests {
     }
 
     #[test]
-    fn every_chart_has_lines() {
-        assert!(CHARTS.iter().all(|(chart, _)| LINES.iter().any(|(_, of)| of == chart)));
+    fn every_chart_has_lines_of_colours_of_their_own() {
+        for (chart, name) in CHARTS {
+            let lines = LINES.iter().filter(|(_, of)| *of == chart).count();
+            assert!((1..=COLOURS.len()).contains(&lines), "{name}: {lines}");
+        }
+        assert_eq!([0.0, 0.126, 2.34, 512.4].map(short), ["0.00", "0.13", "2.3", "512"]);
     }
 }

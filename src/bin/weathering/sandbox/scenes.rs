@@ -9,7 +9,7 @@ use bevy_weathering::picture::read_picture;
 use image::ImageFormat;
 
 use super::model::is_model;
-use super::open::{Opened, Opening, open};
+use super::open::{Opened, open};
 use super::ui::{AddPanel, Place};
 
 /// Width and height of a thumbnail, pixels.
@@ -102,13 +102,6 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     let opened = world.resource::<Opened>().loaded.file.clone();
     // A name alone has no folder.
     let opened = std::path::absolute(&opened).unwrap_or(opened);
-    if let Some(file) = world.resource::<Opening>().file() {
-        let text = format!("opening {}", file.display());
-        ui.horizontal(|ui| {
-            ui.spinner();
-            ui.label(text);
-        });
-    }
     let mut chosen = None;
     world.resource_scope(|_, mut scenes: Mut<Scenes>| {
         let scenes = &mut *scenes;
@@ -117,16 +110,19 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
             scenes.folder = folder.to_string_lossy().into_owned();
         }
         ui.horizontal(|ui| {
-            ui.label("folder");
-            ui.text_edit_singleline(&mut scenes.folder);
+            ui.label("folder").on_hover_text("Its scenarios and models are listed below");
+            ui.add(egui::TextEdit::singleline(&mut scenes.folder).desired_width(f32::INFINITY));
         });
         if scenes.read.as_ref() != Some(&scenes.folder) {
             scenes.entries = list(Path::new(&scenes.folder)).into_iter().map(entry).collect();
             scenes.read = Some(scenes.folder.clone());
         }
         ui.horizontal(|ui| {
-            ui.label("path");
-            let text = ui.text_edit_singleline(&mut scenes.path);
+            ui.label("path").on_hover_text("Of a scenario or a model to open");
+            // The button has to have room behind it.
+            let width = (ui.available_width() - 60.0).max(60.0);
+            let text = egui::TextEdit::singleline(&mut scenes.path).desired_width(width);
+            let text = ui.add(text.hint_text(".ron, .glb or .gltf"));
             let text = text.on_hover_text(".ron, .glb or .gltf; or drop a file on the window");
             let is_entered = text.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
             if (ui.button("Open").clicked() || is_entered) && !scenes.path.trim().is_empty() {

@@ -105,7 +105,7 @@ impl HoseSettings {
 
 impl Default for HoseSettings {
     fn default() -> Self {
-        Self { effect: "hose".into(), litres_per_minute: 15.0, nozzle_mm: 8.0, spread_deg: 3.0, rate: 600.0 }
+        Self { effect: "hose".into(), litres_per_minute: 15.0, nozzle_mm: 6.0, spread_deg: 3.0, rate: 600.0 }
     }
 }
 

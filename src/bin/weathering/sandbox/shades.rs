@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::visibility::RenderLayers;
-use bevy::image::{ImageAddressMode, ImageSampler, ImageSamplerDescriptor};
+use bevy::image::{ImageAddressMode, ImageFilterMode, ImageSampler, ImageSamplerDescriptor};
 use bevy::light::NotShadowCaster;
 use bevy::mesh::UvChannel;
 use bevy::prelude::*;
@@ -30,6 +30,8 @@ const EVERY: f32 = 0.5;
 const MOST_FILM_MM: f32 = 0.5;
 /// How much of the surface the cover hides, 0..=255.
 const OPACITY: u8 = 225;
+/// Pieces of the colours that are shown beside their meaning.
+const STEPS: usize = 24;
 /// So that it lies on its surface, and not in it.
 const DEPTH_BIAS: f32 = 8.0;
 
@@ -65,14 +67,54 @@ pub fn show(ui: &mut egui::Ui, world: &mut World) {
     }
     match shade {
         Shade::Off => {}
-        Shade::Wetness | Shade::Saturation => {
-            ui.small("black is none, white is all");
-        }
-        Shade::Film => {
-            ui.small(format!("black is none, white is {MOST_FILM_MM} mm or more"));
-        }
+        Shade::Wetness | Shade::Saturation => ramp(ui, "0", "100 %"),
+        Shade::Film => ramp(ui, "0", &format!("{MOST_FILM_MM} mm or more")),
         Shade::Source => sources::legend(ui, world),
     }
+}
+
+/// What the colours in the scene stand for, in its upper left corner: nobody has to know which panel has it.
+pub fn show_key(context: &egui::Context, free: egui::Rect, world: &World) {
+    let shade = world.resource::<Settings>().views.shade;
+    let name = match shade {
+        Shade::Off => return,
+        Shade::Wetness => "how wet surfaces look",
+        Shade::Film => "water on surfaces",
+        Shade::Saturation => "how full pores are",
+        Shade::Source => "where water came from",
+    };
+    let area = egui::Area::new("shades".into()).interactable(false).order(egui::Order::Middle);
+    area.fixed_pos(free.left_top() + egui::vec2(10.0, 10.0)).show(context, |ui| {
+        egui::Frame::popup(ui.style()).show(ui, |ui| {
+            ui.set_max_width((free.width() - 40.0).max(120.0));
+            ui.label(format!("false colours: {name} (V: next)"));
+            match shade {
+                Shade::Off => {}
+                Shade::Source => sources::legend(ui, world),
+                Shade::Film => ramp(ui, "0", &format!("{MOST_FILM_MM} mm or more")),
+                Shade::Wetness | Shade::Saturation => ramp(ui, "0", "100 %"),
+            }
+        });
+    });
+}
+
+/// The colours from nothing to all, between what the two ends are.
+pub fn ramp(ui: &mut egui::Ui, least: &str, most: &str) {
+    ui.horizontal(|ui| {
+        ui.small(least);
+        let (rect, _) = ui.allocate_exact_size(egui::vec2(96.0, 10.0), egui::Sense::hover());
+        let step = rect.width() / STEPS as f32;
+        for index in 0..STEPS {
+            let left = rect.left() + step * index as f32;
+            let piece =
+                egui::Rect::from_min_size(egui::pos2(left, rect.top()), egui::vec2(step, rect.height()));
+            let colour = maps::colour((index as f32 + 0.5) / STEPS as f32);
+            ui.painter().rect_filled(piece, 0.0, colour);
+        }
+        let line = egui::Stroke::new(1.0, egui::Color32::GRAY);
+        ui.painter().rect_stroke(rect, 0.0, line, egui::StrokeKind::Outside);
+        ui.small(most);
+    });
 }
 
 type Coverable =
@@ -145,11 +187,17 @@ fn picture(wrap: [Wrap; 2]) -> Image {
         Wrap::Repeat => ImageAddressMode::Repeat,
         Wrap::Clamp => ImageAddressMode::ClampToEdge,
     });
-    // A source is one or the other, and nothing in between.
-    let nearest = ImageSamplerDescriptor::nearest();
-    image.sampler =
-        ImageSampler::Descriptor(ImageSamplerDescriptor { address_mode_u, address_mode_v, ..nearest });
+    image.sampler = ImageSampler::Descriptor(ImageSamplerDescriptor {
+        address_mode_u,
+        address_mode_v,
+        ..ImageSamplerDescriptor::linear()
+    });
     image
+}
+
+/// How what lies between two samples is seen: a source is one or the other, of an amount there is something in between.
+fn filter(shade: Shade) -> ImageFilterMode {
+    if shade == Shade::Source { ImageFilterMode::Nearest } else { ImageFilterMode::Linear }
 }
 
 /// Reads a surface into the picture of its cover.
@@ -171,6 +219,9 @@ fn paint(
     let surface = surface.parent();
     let Ok((water, geometry)) = surfaces.get(surface) else { return };
     let Some(mut image) = images.get_mut(&cover.image) else { return };
+    if let ImageSampler::Descriptor(sampler) = &mut image.sampler {
+        [sampler.mag_filter, sampler.min_filter] = [filter(shade); 2];
+    }
     let Some(data) = &mut image.data else { return };
     for (pixel, index) in data.chunks_exact_mut(4).zip(0u32..) {
         let uv = (Vec2::new((index % SIDE) as f32, (index / SIDE) as f32) + 0.5) / SIDE as f32;
@@ -217,5 +268,7 @@ mod tests {
         let ImageSampler::Descriptor(sampler) = image.sampler else { panic!("it has a sampler of its own") };
         assert!(matches!(sampler.address_mode_u, ImageAddressMode::Repeat));
         assert!(matches!(sampler.address_mode_v, ImageAddressMode::ClampToEdge));
+        assert!(matches!(filter(Shade::Source), ImageFilterMode::Nearest));
+        assert!(matches!(filter(Shade::Film), ImageFilterMode::Linear));
     }
 }

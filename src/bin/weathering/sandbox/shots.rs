@@ -30,11 +30,15 @@ struct Sequence {
 #[derive(Resource, Default)]
 struct Wanted(Option<PathBuf>);
 
+/// Takes pictures: panels go from the frame that becomes one.
+#[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
+pub struct TakeSystems;
+
 pub fn plugin(app: &mut App) {
     app.init_resource::<Sequence>()
         .init_resource::<Wanted>()
         .add_systems(Update, keys)
-        .add_systems(PostUpdate, (follow_sequence, take).chain())
+        .add_systems(PostUpdate, (follow_sequence, take).chain().in_set(TakeSystems))
         .add_panel(Place::Side, "Files", show);
 }
 

@@ -7,7 +7,7 @@
 mod copies;
 
 use bevy::camera::visibility::RenderLayers;
-use bevy::camera::{Exposure, Viewport};
+use bevy::camera::{CameraUpdateSystems, Exposure, Viewport};
 use bevy::core_pipeline::prepass::DepthPrepass;
 use bevy::light::{EnvironmentMapLight, Skybox};
 use bevy::prelude::*;
@@ -20,14 +20,14 @@ use bevy_weathering::record::Recording;
 use bevy_weathering::scenario::SceneEntity;
 
 use super::camera::View;
-use super::theme;
-use super::ui::{AddPanel, Place};
+use super::ui::{AddPanel, Place, UiCamera, UiInput};
+use super::{shots, theme};
 
 /// What both cameras see is in both of these layers.
 const LAYERS: [usize; 2] = [0, 1];
 /// Added to the streams of emitters.
 const STREAMS: u32 = 1 << 30;
-/// Where the divider may be, in parts of the window's width.
+/// Where the divider may be, in parts of the width that panels leave.
 const DIVIDER: (f32, f32) = (0.1, 0.9);
 
 /// The comparison, while there is one.
@@ -37,7 +37,7 @@ pub struct Split {
     pub offset: Vec3,
     /// Bounds of the scene without its copy.
     bounds: (Vec3, Vec3),
-    /// Of the divider, in parts of the window's width.
+    /// Of the divider, in parts of the width that panels leave.
     at: f32,
 }
 
@@ -51,7 +51,14 @@ pub struct SecondCamera;
 
 pub fn plugin(app: &mut App) {
     app.add_systems(PreUpdate, follow_emitters.run_if(resource_exists::<Split>))
-        .add_systems(PostUpdate, (divide, follow_camera).before(TransformSystems::Propagate))
+        .add_systems(
+            PostUpdate,
+            (
+                // Pictures may have other parts than the window has, and a camera draws what fits its part.
+                divide.after(shots::TakeSystems).before(CameraUpdateSystems),
+                follow_camera.before(TransformSystems::Propagate),
+            ),
+        )
         .add_systems(
             PostUpdate,
             // Where everything is in this frame.
@@ -165,16 +172,19 @@ fn follow_emitters(
     }
 }
 
-/// Gives each camera its part of the window.
+/// Gives each camera its part of what panels leave of the window; of all of it in pictures without panels.
 fn divide(
     // Not a condition of both systems: panels may end the comparison between it and the second one.
     split: If<Res<Split>>,
+    input: Res<UiInput>,
+    panels: Query<&Camera, (With<UiCamera>, Without<View>, Without<SecondCamera>)>,
     window: Query<&Window, With<PrimaryWindow>>,
     mut first: Query<&mut Camera, (With<View>, Without<SecondCamera>)>,
     mut second: Query<&mut Camera, With<SecondCamera>>,
 ) {
     let Ok(window) = window.single() else { return };
-    let [left, right] = viewports(window.physical_size(), split.at);
+    let free = input.free.filter(|_| panels.iter().any(|camera| camera.is_active));
+    let [left, right] = viewports(area(window.physical_size(), free), split.at);
     for mut camera in &mut first {
         set_viewport(&mut camera, left.clone());
     }
@@ -192,16 +202,23 @@ fn set_viewport(camera: &mut Mut<Camera>, viewport: Viewport) {
     }
 }
 
-/// Left and right of a divider; neither is empty, and together they are the window, if it is two pixels wide.
-fn viewports(size: UVec2, at: f32) -> [Viewport; 2] {
-    let size = size.max(UVec2::new(2, 1));
-    let left = ((size.x as f32 * at) as u32).clamp(1, size.x - 1);
+/// The pixels of a window that panels leave free; all of them, if they leave none. At least two beside each other.
+fn area(size: UVec2, free: Option<Rect>) -> URect {
+    let whole = URect::from_corners(UVec2::ZERO, size.max(UVec2::new(2, 1)));
+    let free = free.map(|free| free.as_urect().intersect(whole));
+    free.filter(|free| free.width() >= 2 && free.height() >= 1).unwrap_or(whole)
+}
+
+/// Left and right of a divider; neither is empty, and together they are the area.
+fn viewports(area: URect, at: f32) -> [Viewport; 2] {
+    let width = area.width().max(2);
+    let left = ((width as f32 * at) as u32).clamp(1, width - 1);
     let part = |x: u32, width: u32| Viewport {
-        physical_position: UVec2::new(x, 0),
-        physical_size: UVec2::new(width, size.y),
+        physical_position: area.min + UVec2::new(x, 0),
+        physical_size: UVec2::new(width, area.height()),
         ..default()
     };
-    [part(0, left), part(left, size.x - left)]
+    [part(0, left), part(left, width - left)]
 }
 
 fn follow_camera(
@@ -217,6 +234,7 @@ fn follow_camera(
 
 fn show(ui: &mut egui::Ui, world: &mut World) {
     ui.label("A copy of the scene on the right, of other materials; the same falls on both.");
+    ui.label("The line between them can be dragged.");
     let is_on = world.contains_resource::<Split>();
     if !is_on {
         if ui.button("Begin").clicked() {
@@ -235,8 +253,7 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
 /// The line between the two, which can be dragged. `free`: what panels leave of the window.
 pub fn show_divider(context: &egui::Context, free: egui::Rect, world: &mut World) {
     let Some(mut split) = world.get_resource_mut::<Split>() else { return };
-    let whole = context.viewport_rect();
-    let x = whole.left() + whole.width() * split.at;
+    let x = free.left() + free.width() * split.at;
     let area = egui::Area::new("divider".into()).order(egui::Order::Middle).movable(false);
     let area = area.fixed_pos(egui::pos2(x - 5.0, free.top())).constrain(false);
     area.show(context, |ui| {
@@ -247,7 +264,7 @@ pub fn show_divider(context: &egui::Context, free: egui::Rect, world: &mut World
         ui.painter().rect_filled(line_rect, 0.0, color);
         if line.dragged() {
             let (least, most) = DIVIDER;
-            split.at = (split.at + line.drag_delta().x / whole.width().max(1.0)).clamp(least, most);
+            split.at = (split.at + line.drag_delta().x / free.width().max(1.0)).clamp(least, most);
         }
         line.on_hover_cursor(egui::CursorIcon::ResizeHorizontal);
     });
@@ -258,15 +275,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_two_parts_are_the_window() {
-        for (size, at) in [((1280, 720), 0.5), ((1281, 720), 0.3), ((3, 1), 0.9), ((0, 0), 0.1)] {
+    fn the_two_parts_are_what_panels_leave() {
+        let free = Rect::new(340.0, 30.0, 1000.0, 550.0);
+        for (size, free, at) in [
+            ((1280, 720), None, 0.5),
+            ((1281, 720), Some(free), 0.3),
+            ((3, 1), None, 0.9),
+            ((0, 0), None, 0.1),
+            // Panels of a window that has become small since, and panels that leave nothing.
+            ((900, 400), Some(free), 0.5),
+            ((320, 200), Some(free), 0.5),
+            ((1280, 720), Some(Rect::new(340.0, 30.0, 340.0, 720.0)), 0.5),
+        ] {
             let size = UVec2::from(size);
-            let [left, right] = viewports(size, at);
-            assert_eq!(left.physical_position, UVec2::ZERO);
-            assert_eq!(right.physical_position, UVec2::new(left.physical_size.x, 0));
+            let area = area(size, free);
+            assert!(area.max.cmple(size.max(UVec2::new(2, 1))).all(), "{area:?}");
+            let [left, right] = viewports(area, at);
+            assert_eq!(left.physical_position, area.min);
+            assert_eq!(right.physical_position, area.min + UVec2::new(left.physical_size.x, 0));
             assert!(left.physical_size.min_element() > 0 && right.physical_size.min_element() > 0);
-            assert_eq!(left.physical_size.x + right.physical_size.x, size.x.max(2));
+            assert_eq!(left.physical_size.x + right.physical_size.x, area.width());
         }
+        assert_eq!(area(UVec2::new(1280, 720), Some(free)), URect::new(340, 30, 1000, 550));
     }
 
     #[test]

@@ -16,11 +16,12 @@ use bevy_egui::{
     EguiContext, EguiGlobalSettings, EguiPlugin, EguiPrimaryContextPass, PrimaryEguiContext,
     egui::{self, output::OutputEvent},
 };
+use bevy_weathering::scenario::ScenarioStatus;
 
-use super::open::Opening;
+use super::open::{Opened, Opening};
 use super::settings::Settings;
 use super::shortcuts::Shortcuts;
-use super::{keys, split, theme};
+use super::{keys, pace, shades, split, theme};
 
 /// Draws a panel.
 pub type Show = fn(&mut egui::Ui, &mut World);
@@ -177,13 +178,17 @@ fn draw(world: &mut World, mut is_dressed: Local<bool>) {
     let mut contexts = world.query_filtered::<&mut EguiContext, With<PrimaryEguiContext>>();
     let Ok(mut context) = contexts.single_mut(world) else { return };
     let context = context.get_mut().clone();
-    if !*is_dressed {
-        *is_dressed = true;
+    let Settings { zoom, panels, maps, plots, .. } = *world.resource::<Settings>();
+    let is_first = !std::mem::replace(&mut *is_dressed, true);
+    if is_first {
         theme::apply(&context);
     }
-    let Settings { zoom, panels, maps, plots, .. } = *world.resource::<Settings>();
     if (context.zoom_factor() - zoom).abs() > 1e-3 {
         context.set_zoom_factor(zoom);
+        // From the next frame on. Panels would keep the width that they get now.
+        if is_first {
+            return;
+        }
     }
     let whole =
         egui::UiBuilder::new().layer_id(egui::LayerId::background()).max_rect(context.viewport_rect());
@@ -198,10 +203,13 @@ fn draw(world: &mut World, mut is_dressed: Local<bool>) {
                     ui.separator();
                 }
                 layout_buttons(ui, world);
+                pace::show_load(ui, world);
             });
         });
         let side: Vec<_> = of(Place::Side).collect();
-        let left = egui::Panel::left("side").resizable(true).default_size(300.0).size_range(230.0..=520.0);
+        // Half of the window, where that is narrow, is the scene's.
+        let width = (0.45 * context.viewport_rect().width()).clamp(230.0, 340.0);
+        let left = egui::Panel::left("side").resizable(true).default_size(width).size_range(230.0..=520.0);
         left.show(&mut root, |ui| show_side(ui, world, &side));
         if maps {
             let right = egui::Panel::right("maps").resizable(true).default_size(280.0);
@@ -212,7 +220,7 @@ fn draw(world: &mut World, mut is_dressed: Local<bool>) {
             });
         }
         if plots {
-            let below = egui::Panel::bottom("plots").resizable(true).default_size(170.0);
+            let below = egui::Panel::bottom("plots").resizable(true).default_size(190.0);
             below.size_range(100.0..=420.0).show(&mut root, |ui| {
                 of(Place::Plots).for_each(|(_, _, show)| show(ui, world));
             });
@@ -221,8 +229,12 @@ fn draw(world: &mut World, mut is_dressed: Local<bool>) {
     let free = root.available_rect_before_wrap();
     split::show_divider(&context, free, world);
     show_note(&context, free, world.resource::<Note>());
+    shades::show_key(&context, free, world);
+    let is_loading = matches!(*world.resource::<ScenarioStatus>(), ScenarioStatus::Loading);
     if let Some(file) = world.resource::<Opening>().file() {
-        show_opening(&context, free, file);
+        show_opening(&context, free, "opening", file);
+    } else if is_loading {
+        show_opening(&context, free, "loading", &world.resource::<Opened>().loaded.file);
     }
     let mut help = world.resource::<Help>().0;
     if help {
@@ -301,25 +313,25 @@ fn layout_buttons(ui: &mut egui::Ui, world: &mut World) {
     ui.toggle_value(&mut settings.maps, "Maps").on_hover_text("The maps of the selected surface (M)");
     ui.toggle_value(&mut settings.plots, "Plots").on_hover_text("What happens, over time (P)");
     let (least, most) = theme::ZOOM;
-    if ui.small_button("A-").on_hover_text("Smaller panels").clicked() {
+    if ui.small_button("A-").on_hover_text("Smaller text and panels").clicked() {
         settings.zoom = (settings.zoom - 0.1).max(least);
     }
-    if ui.small_button("A+").on_hover_text("Larger panels").clicked() {
+    if ui.small_button("A+").on_hover_text("Larger text and panels").clicked() {
         settings.zoom = (settings.zoom + 0.1).min(most);
     }
     let mut help = world.resource_mut::<Help>();
     ui.toggle_value(&mut help.0, "?").on_hover_text("All keys (? or F1)");
 }
 
-/// That a scene is on its way, in the middle of the one before.
-fn show_opening(context: &egui::Context, free: egui::Rect, file: &Path) {
+/// That a scene is on its way, in the middle of the one before, or that there is more of it to come.
+fn show_opening(context: &egui::Context, free: egui::Rect, what: &str, file: &Path) {
     let area = egui::Area::new("opening".into()).interactable(false).order(egui::Order::Foreground);
     let name = file.file_name().unwrap_or(file.as_os_str()).to_string_lossy();
     area.fixed_pos(free.center()).pivot(egui::Align2::CENTER_CENTER).show(context, |ui| {
         egui::Frame::popup(ui.style()).show(ui, |ui| {
             ui.horizontal(|ui| {
                 ui.spinner();
-                ui.label(format!("opening {name}"));
+                ui.label(format!("{what} {name}"));
             });
         });
     });

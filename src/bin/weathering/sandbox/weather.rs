@@ -26,6 +26,16 @@ pub const NAME: &str = "rain over the scene";
 /// Number of its random stream.
 const STREAM: u32 = u32::MAX - 1;
 
+/// Where the wind was set to go to, degrees, for as long as there is none along the ground: a wind of 0 has no direction.
+#[derive(Resource, Default)]
+struct Vane(f32);
+
+impl Vane {
+    fn heading_deg(&self, wind: Vec3) -> f32 {
+        if wind.x == 0.0 && wind.z == 0.0 { self.0 } else { wind.x.atan2(-wind.z).to_degrees() }
+    }
+}
+
 /// How much falls, and what.
 #[derive(Resource, Debug, Clone, PartialEq)]
 struct Rain {
@@ -71,11 +81,10 @@ impl Followed {
 }
 
 pub fn plugin(app: &mut App) {
-    app.init_resource::<Rain>().add_systems(Update, (follow_scene, follow_recording)).add_panel(
-        Place::Side,
-        "Weather",
-        show,
-    );
+    app.init_resource::<Rain>()
+        .init_resource::<Vane>()
+        .add_systems(Update, (follow_scene, follow_recording))
+        .add_panel(Place::Side, "Weather", show);
 }
 
 fn show(ui: &mut egui::Ui, world: &mut World) {
@@ -83,10 +92,10 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     let before = *world.resource::<Weather>();
     let mut weather = before;
     ui.heading("Air");
-    number(ui, "T, C", &mut weather.temperature_c, (-40.0, 60.0), "Temperature; below 0 nothing dries");
-    number(ui, "RH", &mut weather.humidity, (0.0, 1.0), "Relative humidity");
+    number(ui, "temperature, °C", &mut weather.temperature_c, (-40.0, 60.0), "T; below 0 nothing dries");
+    number(ui, "humidity", &mut weather.humidity, (0.0, 1.0), "RH, relative humidity; at 1 nothing dries");
     let mut speed = Vec2::new(weather.wind.x, weather.wind.z).length();
-    let mut heading_deg = weather.wind.x.atan2(-weather.wind.z).to_degrees();
+    let mut heading_deg = world.resource::<Vane>().heading_deg(weather.wind);
     let mut up = weather.wind.y;
     let (speed_before, heading_before, up_before) = (speed, heading_deg, up);
     number(ui, "wind, m/s", &mut speed, (0.0, 40.0), "Moves particles and carries vapour away");
@@ -94,9 +103,16 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     number(ui, "upwards, m/s", &mut up, (-20.0, 20.0), "");
     if (speed, heading_deg, up) != (speed_before, heading_before, up_before) {
         weather.wind = wind(speed, heading_deg, up);
+        world.resource_mut::<Vane>().0 = heading_deg;
     }
     ui.heading("Sun");
-    number(ui, "power, W/m2", &mut weather.sun_w_per_m2, (0.0, 1400.0), "On what faces it; dries");
+    number(
+        ui,
+        "power, W/m²",
+        &mut weather.sun_w_per_m2,
+        (0.0, 1400.0),
+        "On what faces it; dries, and does not light",
+    );
     let towards = (-weather.sun_direction).normalize_or(Vec3::Y);
     let mut height_deg = towards.y.clamp(-1.0, 1.0).asin().to_degrees();
     let mut around_deg = towards.x.atan2(-towards.z).to_degrees();
@@ -104,7 +120,7 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     // A recording keeps the sun where it is.
     ui.add_enabled_ui(!world.contains_resource::<Recording>(), |ui| {
         number(ui, "height, degrees", &mut height_deg, (1.0, 89.0), "Above the horizon");
-        number(ui, "around, degrees", &mut around_deg, (-180.0, 180.0), "0 is -z, 90 is +x");
+        number(ui, "direction, degrees", &mut around_deg, (-180.0, 180.0), "0 is -z, 90 is +x");
     });
     let moved = (height_deg, around_deg) != angles;
     if moved {
@@ -115,8 +131,16 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     number(ui, "times as fast", &mut weather.drying_speed, (0.0, 100_000.0), "It takes hours in the world");
     let demand = weather.demand_mm_per_h();
     ui.label(format!("a wet surface loses {:.2} mm/h, {:.2} more in the sun", demand.air_mm, demand.sun_mm));
-    let points = world.resource::<DryingClock>().points().len();
-    ui.small(format!("{points} changes of the weather so far"));
+    // The first is the weather at the start.
+    match world.resource::<DryingClock>().points().len().saturating_sub(1) {
+        0 => {}
+        1 => {
+            ui.small("the weather has changed once so far");
+        }
+        changes => {
+            ui.small(format!("the weather has changed {changes} times so far"));
+        }
+    }
     if weather != before {
         *world.resource_mut::<Weather>() = weather;
     }
@@ -140,7 +164,7 @@ fn show_light(ui: &mut egui::Ui, world: &mut World, direction: Option<Vec3>) {
     let mut lights = world.query::<(&mut DirectionalLight, &mut Transform)>();
     let Some((mut light, mut transform)) = lights.iter_mut(world).next() else { return };
     let mut lux = light.illuminance;
-    number(ui, "light, lux", &mut lux, (0.0, 130_000.0), "How bright it shows the scene");
+    number(ui, "light, lux", &mut lux, (0.0, 130_000.0), "How bright it shows the scene; does not dry");
     if lux != light.illuminance {
         light.illuminance = lux;
     }
@@ -307,6 +331,11 @@ mod tests {
         }
         assert!((wind(3.0, 90.0, 1.0) - Vec3::new(3.0, 1.0, 0.0)).length() < 1e-5);
         assert!((wind(2.0, 0.0, 0.0) - Vec3::new(0.0, 0.0, -2.0)).length() < 1e-5);
+        // A direction can be set before there is a wind.
+        let vane = Vane(75.0);
+        assert_eq!((vane.heading_deg(Vec3::ZERO), vane.heading_deg(wind(0.0, 10.0, 3.0))), (75.0, 75.0));
+        assert!((vane.heading_deg(wind(3.0, -20.0, 1.0)) + 20.0).abs() < 1e-3);
+        assert_eq!(Vane::default().heading_deg(Weather::default().wind), 0.0);
     }
 
     #[test]

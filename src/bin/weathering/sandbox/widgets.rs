@@ -3,11 +3,15 @@
 use bevy_egui::egui::{self, Response, Ui};
 use bevy_weathering::material::range_of;
 
+/// Whether the small numbers of a range would be but a few pixels of its slider.
+fn is_wide(least: f32, most: f32) -> bool {
+    least >= 0.0 && (most > 50.0 * least.max(1.0) || (least > 0.0 && most > 500.0 * least))
+}
+
 /// A number within a range. Wide ranges are logarithmic. What is out of it already stays so until somebody edits it.
 pub fn number(ui: &mut Ui, label: &str, value: &mut f32, (least, most): (f32, f32), about: &str) {
-    let is_wide = least >= 0.0 && most > 50.0 * least.max(1.0);
     let slider = egui::Slider::new(value, least..=most)
-        .logarithmic(is_wide)
+        .logarithmic(is_wide(least, most))
         .smallest_positive(1e-3)
         .clamping(egui::SliderClamping::Edits)
         .text(label);
@@ -22,9 +26,8 @@ pub fn number(ui: &mut Ui, label: &str, value: &mut f32, (least, most): (f32, f3
 pub fn parameter(ui: &mut Ui, symbol: &str, field: &str, value: &mut f32, most: Option<f32>, about: &str) {
     let Some((least, allowed)) = range_of(field) else { return };
     let most = most.unwrap_or(allowed).min(allowed);
-    let is_wide = most > 50.0 * least.max(1.0) || (least > 0.0 && most > 500.0 * least);
     let slider = egui::Slider::new(value, least..=most)
-        .logarithmic(is_wide)
+        .logarithmic(is_wide(least, most))
         .smallest_positive(1e-3)
         .clamping(egui::SliderClamping::Never)
         .text(symbol);
@@ -59,6 +62,16 @@ pub fn color_and_opacity(ui: &mut Ui, rgba: &mut [f32; 4]) -> Response {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn ranges_over_several_powers_of_ten_are_wide() {
+        // Metres of a brush, litres of a hose, mm/h of rain.
+        assert!([(0.005, 5.0), (0.1, 100.0), (0.0, 200.0)].iter().all(|&(least, most)| is_wide(least, most)));
+        // Parts, degrees, and strengths.
+        assert!(
+            [(0.0, 1.0), (-180.0, 180.0), (0.01, 1.0)].iter().all(|&(least, most)| !is_wide(least, most))
+        );
+    }
 
     #[test]
     fn colours_that_are_only_looked_at_stay_to_the_bit() {

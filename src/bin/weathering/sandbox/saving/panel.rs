@@ -71,7 +71,7 @@ pub fn show(ui: &mut egui::Ui, world: &mut World) {
     let mut folder = named_folder(world);
     ui.horizontal(|ui| {
         ui.label("folder");
-        ui.text_edit_singleline(&mut folder);
+        ui.add(egui::TextEdit::singleline(&mut folder).desired_width(f32::INFINITY));
     });
     let path = PathBuf::from(folder.trim());
     world.resource_mut::<Folder>().0 = Some(folder);
