@@ -21,7 +21,7 @@ pub struct Leaving(pub bool);
 
 /// Whether something has been sprayed or painted that no saved scene has.
 #[derive(Resource, Default)]
-struct Unsaved(bool);
+pub struct Unsaved(pub bool);
 
 /// How long the key is remembered to have been pressed.
 const PATIENCE: Duration = Duration::from_secs(15);
@@ -35,18 +35,17 @@ pub fn plugin(app: &mut App) {
         .add_systems(Last, finish_writing);
 }
 
-/// Follows whether there is something to lose.
+/// Follows whether there is something to lose. That a scene is saved is told by those who do it.
 fn notice(
     pointed: Res<Pointed>,
     settings: Res<Settings>,
-    saving: Res<Saving>,
     opened: Res<Opened>,
     mut unsaved: ResMut<Unsaved>,
 ) {
     if pointed.pressed && settings.tool != Tool::Probe {
         unsaved.0 = true;
     }
-    if opened.is_changed() || saving.is_saving() {
+    if opened.is_changed() {
         unsaved.0 = false;
     }
 }

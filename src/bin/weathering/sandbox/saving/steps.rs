@@ -13,7 +13,7 @@ use bevy_weathering::scenario::{LoadedScenario, ScenarioSurface, reset_scenario}
 
 use super::super::added;
 use super::super::hose::InHand;
-use super::super::leave::Leaving;
+use super::super::leave::{Leaving, Unsaved};
 use super::super::open::Opened;
 use super::super::ui::Note;
 use super::super::undo::Undo;
@@ -139,6 +139,7 @@ pub(super) fn advance(world: &mut World) {
                 if written.is_err() {
                     // There may be another folder to save it into.
                     world.resource_mut::<Leaving>().0 = false;
+                    world.resource_mut::<Unsaved>().0 = true;
                 }
                 let mut note = world.resource_mut::<Note>();
                 match written {
@@ -186,6 +187,8 @@ fn take(world: &mut World, purpose: Purpose, colors: Vec<ColorMaps>) -> Option<S
             return None;
         }
     };
+    // What is done from now on is not in it.
+    world.resource_mut::<Unsaved>().0 = false;
     let to = folder.clone();
     let task = AsyncComputeTaskPool::get().spawn(async move { scene.write(&to) });
     Some(Step::Writing { folder, task })
