@@ -30,7 +30,7 @@ pub fn plugin(app: &mut App) {
     app.init_resource::<Leaving>()
         .init_resource::<Unsaved>()
         .insert_resource(RenderErrorHandler(give_up))
-        .add_systems(Update, (notice, press, close).chain())
+        .add_systems(Update, (notice.run_if(resource_exists::<Opened>), press, close).chain())
         .add_systems(PostUpdate, leave)
         .add_systems(Last, finish_writing);
 }

@@ -193,6 +193,17 @@ mod tests {
     }
 
     #[test]
+    fn escape_asks_before_it_leaves_what_is_not_saved() {
+        let mut app = app();
+        app.world_mut().resource_mut::<leave::Unsaved>().0 = true;
+        app.insert_resource(Shortcuts::of(KeyCode::Escape));
+        app.update();
+        assert_eq!(app.should_exit(), None);
+        app.update();
+        assert_eq!(app.should_exit(), Some(AppExit::Success));
+    }
+
+    #[test]
     fn a_pause_while_a_moment_is_kept_comes_after_it() {
         let mut world = World::new();
         let purpose = Purpose::Moment { goes_on: true };
