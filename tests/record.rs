@@ -271,6 +271,55 @@ fn a_stroke_that_is_taken_back_has_never_been() {
 }
 
 #[test]
+fn strokes_of_a_pause_are_taken_back_one_by_one() {
+    let paint = |session: &mut Session, kind, x| {
+        session.world().resource_mut::<Recording>().begin_stroke();
+        session.paint(kind, x, 0.05);
+        // A frame without a tick.
+        session.app.update();
+    };
+    let strokes = |session: &mut Session| session.world().resource::<Recording>().strokes();
+    let mut session = Session::new();
+    session.run(10);
+    paint(&mut session, BrushKind::Dirty, 1.0);
+    session.run(10);
+    let before = session.digest();
+    paint(&mut session, BrushKind::Wet, -1.0);
+    paint(&mut session, BrushKind::Dirty, -1.0);
+    assert_eq!(strokes(&mut session), 3);
+    // They have not been painted, and nobody has to go back.
+    for left in [2, 1] {
+        assert!(take_back_stroke(session.world()).unwrap());
+        assert!(session.world().resource::<Recording>().is_live());
+        assert_eq!(strokes(&mut session), left);
+        assert_eq!(session.world().resource::<BrushQueue>().0.len(), left - 1);
+    }
+    assert_eq!(session.digest(), before);
+    // Painted in one tick, they still are two.
+    paint(&mut session, BrushKind::Wet, -1.0);
+    paint(&mut session, BrushKind::Dirty, -1.0);
+    session.run(20);
+    assert_eq!(strokes(&mut session), 3);
+    assert!(take_back_stroke(session.world()).unwrap());
+    session.arrive();
+    assert_eq!(strokes(&mut session), 2);
+    let mut clean = Session::new();
+    clean.run(10);
+    paint(&mut clean, BrushKind::Dirty, 1.0);
+    clean.run(10);
+    paint(&mut clean, BrushKind::Wet, -1.0);
+    clean.run(20);
+    let after = session.digest();
+    assert_eq!(after, clean.digest());
+    let file = session.save();
+    assert_eq!(replayed(&file), after);
+    // Where one has gone back to before all strokes, there is none to take back.
+    session.go_to(0.25);
+    assert_eq!(strokes(&mut session), 0);
+    assert!(!take_back_stroke(session.world()).unwrap());
+}
+
+#[test]
 fn what_cannot_be_recorded_is_refused_or_told() {
     let mut session = Session::new();
     session.run(5);

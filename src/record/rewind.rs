@@ -115,7 +115,8 @@ pub fn put_back(world: &mut World) -> Result<(), RecordError> {
 }
 
 /// Takes the last stroke of a brush back: the session is gone through again, from before it to the present, without it. Goes on as
-/// [`go_to`] does. `false` if there is none.
+/// [`go_to`] does; or, if all of it still waits for the next tick, it is dropped, and the session stays
+/// [live](Recording::is_live). `false` if there is none.
 ///
 /// # Errors
 /// As [`go_to`].
@@ -123,19 +124,23 @@ pub fn take_back_stroke(world: &mut World) -> Result<bool, RecordError> {
     let Some(mut recording) = world.remove_resource::<Recording>() else {
         return Err(RecordError::NotRecording);
     };
-    let now = recording.tick;
-    let painted = recording.actions.iter().filter(|action| action.stroke > 0 && action.tick <= now);
-    let last = painted.map(|action| action.stroke).max();
+    recording.number_touches(world);
+    let (now, is_live, last) = (recording.tick, recording.is_live(), recording.last_stroke());
     let first = recording.actions.iter().find(|action| Some(action.stroke) == last).map(|first| first.tick);
-    if let (Some(stroke), Some(first), true) = (last, first, recording.is_live()) {
+    if let (Some(stroke), true) = (last, is_live) {
+        // Those of an earlier stroke may go on waiting.
+        recording.drop_touches(world, stroke);
+    }
+    if let (Some(stroke), Some(first), true) = (last, first, is_live) {
         recording.actions.retain(|action| action.stroke != stroke);
         recording.history.forget_after(first.saturating_sub(1));
         recording.update_events(world);
     }
-    let is_there = last.is_some();
     world.insert_resource(recording);
-    if is_there {
+    // Nothing has come of what was not painted yet.
+    let has_acted = first.is_some();
+    if last.is_some() && (has_acted || !is_live) {
         go_to_tick(world, now)?;
     }
-    Ok(is_there)
+    Ok(last.is_some())
 }

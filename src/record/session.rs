@@ -50,8 +50,10 @@ pub struct Recording {
     others: Vec<Action>,
     /// Emitters that come or go in the next tick.
     pub(super) changes: Vec<Change>,
-    /// Number of the stroke that is being painted, or was last.
+    /// Number of the stroke that is being painted, or was last; 1 or more.
     stroke: u32,
+    /// Numbers of the strokes that touches which wait are of, as far as they have been seen.
+    waiting: Vec<u32>,
     flaws: Vec<(u32, &'static str)>,
     notes: Vec<String>,
     pub(super) watched: Watched,
@@ -151,14 +153,37 @@ impl Recording {
         self.stroke += 1;
     }
 
-    /// Number of strokes that can be taken back.
+    /// Number of strokes that can be taken back: of those before the present, and of those that wait for the next tick.
     pub fn strokes(&self) -> usize {
         // Later ones have higher numbers, so each is a run.
         let mut last = 0;
-        let begins = |action: &&Recorded| {
-            action.stroke > 0 && std::mem::replace(&mut last, action.stroke) != action.stroke
-        };
-        self.actions.iter().filter(begins).count()
+        let begins = |stroke: &u32| *stroke > 0 && std::mem::replace(&mut last, *stroke) != *stroke;
+        self.painted().chain(self.waiting.iter().copied()).filter(begins).count()
+    }
+
+    /// Numbers of the strokes that what was done until now is of, 0 for what is no touch.
+    fn painted(&self) -> impl Iterator<Item = u32> {
+        self.actions.iter().filter(|action| action.tick <= self.tick).map(|action| action.stroke)
+    }
+
+    /// Number of the last stroke that was painted, or waits to be.
+    pub(super) fn last_stroke(&self) -> Option<u32> {
+        self.painted().chain(self.waiting.iter().copied()).max().filter(|stroke| *stroke > 0)
+    }
+
+    /// Touches that have come since this was done last are of the stroke that is being painted.
+    pub(super) fn number_touches(&mut self, world: &World) {
+        let count = world.get_resource::<BrushQueue>().map_or(0, |queue| queue.0.len());
+        self.waiting.resize(count, self.stroke);
+    }
+
+    /// Touches of a stroke, and of those after it, that wait for the next tick do not happen.
+    pub(super) fn drop_touches(&mut self, world: &mut World, stroke: u32) {
+        let kept = self.waiting.partition_point(|number| *number < stroke);
+        self.waiting.truncate(kept);
+        if let Some(mut queue) = world.get_resource_mut::<BrushQueue>() {
+            queue.0.truncate(kept);
+        }
     }
 
     pub(super) fn hz(&self) -> u32 {
@@ -197,11 +222,13 @@ impl Recording {
     pub(super) fn forget_wishes(&mut self) {
         self.others.clear();
         self.changes.clear();
+        self.waiting.clear();
         self.watched.forget_wishes();
     }
 
     /// Takes back what was changed since events last acted, for the next tick.
     fn take_back(&mut self, world: &mut World) {
+        self.number_touches(world);
         if self.phase == Phase::Loading && matches!(world.resource::<ScenarioStatus>(), ScenarioStatus::Ready)
         {
             self.phase = Phase::Live;
@@ -215,9 +242,9 @@ impl Recording {
         }
     }
 
-    /// What is wanted in a tick.
-    fn take_actions(&mut self, world: &mut World, tick: u32) -> Vec<Action> {
-        let mut actions = Vec::new();
+    /// What is wanted in a tick, with the numbers of strokes, 0 for what is none.
+    fn take_actions(&mut self, world: &mut World, tick: u32) -> Vec<(Action, u32)> {
+        let mut actions = self.change_emitters(world, tick);
         self.watched.take_actions(tick, self.hz(), &mut actions);
         if let Some(change) = self.watched.take_weather() {
             match self.refusal_of(world, &change, tick) {
@@ -225,22 +252,25 @@ impl Recording {
                 Some(note) => self.add_note(note),
             }
         }
-        for Stroke { brush, surface } in take_strokes(world) {
+        let mut actions: Vec<_> = actions.into_iter().map(|action| (action, 0)).collect();
+        let numbers = std::mem::take(&mut self.waiting);
+        for (Stroke { brush, surface }, number) in take_strokes(world).into_iter().zip(numbers) {
             let name = surface
                 .map(|surface| world.get::<ScenarioSurface>(surface).map(|surface| surface.name.clone()));
             if name == Some(None) {
                 self.add_note("only surfaces of the scenario are painted while a session is recorded");
                 continue;
             }
-            actions.push(Action::Brush(BrushEvent {
+            let touch = BrushEvent {
                 kind: brush.kind,
                 point: brush.point,
                 radius: brush.radius,
                 strength: brush.strength,
                 surface: name.flatten(),
-            }));
+            };
+            actions.push((Action::Brush(touch), number));
         }
-        actions.append(&mut self.others);
+        actions.extend(self.others.drain(..).map(|action| (action, 0)));
         actions
     }
 
@@ -262,10 +292,10 @@ impl Recording {
     }
 
     /// Lets things happen in a tick, and from then on be recorded.
-    fn record(&mut self, world: &mut World, tick: u32, actions: Vec<Action>) {
+    fn record(&mut self, world: &mut World, tick: u32, actions: Vec<(Action, u32)>) {
         let at = beginning_of(tick, self.hz());
         let (mut is_past, mut count) = (tick <= self.end, 0);
-        for what in actions {
+        for (what, stroke) in actions {
             let event = EventSpec { at, what };
             if let Err(error) = self.loaded.validate_new_event("events[_]", &event) {
                 self.add_note(error.to_string());
@@ -280,8 +310,6 @@ impl Recording {
             if std::mem::take(&mut is_past) {
                 self.branch(world, tick);
             }
-            let is_stroke = matches!(event.what, Action::Brush(_));
-            let stroke = if is_stroke { self.stroke.max(1) } else { 0 };
             self.actions.push(Recorded { tick, what: event.what, stroke });
             count += 1;
         }
@@ -374,7 +402,8 @@ pub fn begin(world: &mut World, base: LoadedScenario) {
         is_stale: false,
         others: Vec::new(),
         changes: Vec::new(),
-        stroke: 0,
+        stroke: 1,
+        waiting: Vec::new(),
         flaws: Vec::new(),
         notes: Vec::new(),
         watched,
@@ -424,10 +453,10 @@ pub(super) fn begin_tick(world: &mut World) {
         recording.tick = tick;
         if !recording.is_live() {
             take_strokes(world);
+            recording.waiting.clear();
             return;
         }
-        let mut actions = recording.change_emitters(world, tick);
-        actions.extend(recording.take_actions(world, tick));
+        let actions = recording.take_actions(world, tick);
         if !actions.is_empty() {
             recording.record(world, tick, actions);
         }

@@ -78,6 +78,7 @@ pub use points::{SurfacePoint, surface_points};
 pub(crate) use posed::forget_poses;
 pub(crate) use prepare::{ExchangeMatter, Measured, put_matter};
 pub use prepare::{MeasureProgress, WetGeometry};
+pub use put_back::{KeptSurface, NotPutBack};
 pub use query::{BecameWet, Dried, SurfaceWetness, WatchWetness, Wetness, WetnessQuery};
 pub use ready::{Refusal, SurfaceReady, SurfaceRefused};
 pub(crate) use resize::Shares;

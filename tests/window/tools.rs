@@ -92,6 +92,12 @@ fn maps_and_the_probe_tell_of_a_stroke_and_of_a_jet_and_the_stroke_is_taken_back
         scenery.log()
     );
     assert_eq!(water(&taken_back), 0.0, "{taken_back}");
+    // And forth, and back again.
+    sandbox.answer("brought a stroke back", |sandbox| sandbox.key("ctrl+shift+z"));
+    let again = probe(&mut sandbox);
+    assert_eq!(water(&again), water(&painted), "{painted}\n{again}");
+    sandbox.answer("nothing to do again", |sandbox| sandbox.key("ctrl+shift+z"));
+    sandbox.answer("took a stroke back", |sandbox| sandbox.key("ctrl+z"));
     sandbox.answer("nothing to take back", |sandbox| sandbox.key("ctrl+z"));
 
     // Where the jet comes down.

@@ -8,16 +8,16 @@ use std::time::Instant;
 use bevy::prelude::*;
 use bevy_egui::egui;
 use bevy_weathering::brush::{Brush, BrushKind, BrushQueue, Stroke, paint_strokes};
-use bevy_weathering::collision::CollisionScene;
+use bevy_weathering::collision::{CollisionScene, SurfaceCollider};
 use bevy_weathering::matter::SurfaceMatter;
 use bevy_weathering::record::Recording;
-use bevy_weathering::wetting::SurfaceWater;
+use bevy_weathering::wetting::{KeptSurface, SurfaceWater, WetGeometry};
 
 use super::hose::Pointed;
 use super::probe::hit;
 use super::settings::{BrushSettings, Settings, Tool};
 use super::ui::{AddPanel, Place, UiInput};
-use super::undo::{Undo, undo};
+use super::undo::{Undo, redo, undo};
 use super::widgets::number;
 
 /// Seconds between two touches of one place.
@@ -46,6 +46,14 @@ impl Tool {
     }
 }
 
+/// Ends the stroke that is being painted, if one is: the button has to be pressed again to paint on.
+pub fn let_go(world: &mut World) {
+    let is_painting = world.get_resource_mut::<Last>().is_some_and(|mut last| last.0.take().is_some());
+    if is_painting && let Some(mut pointed) = world.get_resource_mut::<Pointed>() {
+        pointed.held = false;
+    }
+}
+
 /// How much a touch does: mm of water or dust, or a part of what is there.
 fn strength(kind: BrushKind, settings: &BrushSettings) -> f32 {
     let most = match kind {
@@ -61,7 +69,7 @@ fn paint(
     settings: Res<Settings>,
     scene: Res<CollisionScene>,
     time: Res<Time<Virtual>>,
-    surfaces: Query<(&SurfaceWater, &SurfaceMatter)>,
+    surfaces: Query<(&SurfaceWater, &SurfaceMatter, &WetGeometry, &SurfaceCollider)>,
     mut queue: ResMut<BrushQueue>,
     mut last: ResMut<Last>,
     mut undo: ResMut<Undo>,
@@ -83,12 +91,12 @@ fn paint(
         return;
     }
     // A surface that is not measured yet cannot be touched.
-    let Ok((water, matter)) = surfaces.get(hit.surface) else { return };
+    let Ok((water, matter, geometry, collider)) = surfaces.get(hit.surface) else { return };
     match &mut recording {
         // A recording takes strokes back in its own way.
         Some(recording) if last.0.is_none() => recording.begin_stroke(),
         Some(_) => {}
-        None => undo.keep(hit.surface, water, matter),
+        None => undo.keep(hit.surface, || KeptSurface::new(water, matter, geometry, collider)),
     }
     last.0 = Some((Instant::now(), hit.point));
     let brush = Brush { kind, point: hit.point, radius, strength: strength(kind, &settings.brush) };
@@ -139,11 +147,17 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     number(ui, "radius, m", &mut brush.radius, radius, "Most in the middle, nothing at the rim");
     number(ui, "strength", &mut brush.strength, strength, "Of 1 mm of water, .2 mm of dust, or all there is");
     let recording = world.get_resource::<Recording>();
-    let count = recording.map_or_else(|| world.resource::<Undo>().count(), Recording::strokes);
-    ui.horizontal(|ui| {
+    let [count, undone] =
+        recording.map_or_else(|| world.resource::<Undo>().counts(), |recording| [recording.strokes(), 0]);
+    ui.horizontal_wrapped(|ui| {
         let button = ui.add_enabled(count > 0, egui::Button::new("Take back"));
-        if button.on_hover_text("The last stroke, or emitter (Ctrl+Z)").clicked() {
+        let about = "The last stroke, with all that its surfaces got since; or emitter (Ctrl+Z)";
+        if button.on_hover_text(about).clicked() {
             undo(world);
+        }
+        let button = ui.add_enabled(undone > 0, egui::Button::new("Do again"));
+        if button.on_hover_text("What was taken back last (Ctrl+Shift+Z)").clicked() {
+            redo(world);
         }
         ui.small(format!("{count} to take back"));
     });
@@ -166,5 +180,17 @@ mod tests {
             }
         }
         assert!([Tool::Hose, Tool::Probe].iter().all(|tool| tool.brush().is_none()));
+    }
+
+    #[test]
+    fn a_stroke_that_is_taken_back_is_not_painted_on_and_an_open_hose_sprays_on() {
+        for last in [None, Some((Instant::now(), Vec3::ZERO))] {
+            let mut world = World::new();
+            world.insert_resource(Pointed { held: true, ..default() });
+            world.insert_resource(Last(last));
+            let_go(&mut world);
+            assert_eq!(world.resource::<Pointed>().held, last.is_none());
+            assert!(world.resource::<Last>().0.is_none());
+        }
     }
 }

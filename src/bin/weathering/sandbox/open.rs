@@ -13,6 +13,7 @@ use bevy_weathering::scenario::{
 };
 
 use super::ui::Note;
+use super::undo::Undo;
 use super::{export, model, record, saving, split};
 
 /// What is open.
@@ -117,6 +118,7 @@ fn finish(world: &mut World) {
             export::give_up(world);
             split::end(world);
             switch_scenario(world, prepared);
+            world.resource_mut::<Undo>().clear();
             model::light_shade(world, is_model);
             world.insert_resource(Opened { loaded });
             world.resource_mut::<Note>().tell(format!("opened {}", file.display()));

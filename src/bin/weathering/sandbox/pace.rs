@@ -13,6 +13,7 @@ use bevy_weathering::schedule::WeatheringTick;
 
 use super::shortcuts::Shortcuts;
 use super::ui::{AddPanel, Note, Place};
+use super::undo::Undo;
 use super::{export, record, saving, theme};
 
 /// Slowest and fastest.
@@ -106,7 +107,10 @@ pub fn start_over(world: &mut World) {
     }
     reset_scenario(world);
     world.insert_resource(ShownTime::Now);
-    world.resource_mut::<Note>().tell("started over");
+    // What they were painted on is no more, and neither are they.
+    let is_final = world.resource_mut::<Undo>().forget_strokes();
+    let told = if is_final { "started over; strokes can no longer be taken back" } else { "started over" };
+    world.resource_mut::<Note>().tell(told);
 }
 
 fn show(ui: &mut egui::Ui, world: &mut World) {
@@ -125,7 +129,12 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     if ui.button("Step").on_hover_text("One tick (N)").clicked() {
         one_tick(world);
     }
-    if ui.button("Start over").on_hover_text("Dry, at the first tick (R)").clicked() {
+    let about = if world.contains_resource::<Recording>() {
+        "To second 0 of the recording (R)"
+    } else {
+        "Dry, at the first tick; strokes go, too, and cannot be taken back then (R)"
+    };
+    if ui.button("Start over").on_hover_text(about).clicked() {
         start_over(world);
     }
     // There is little room in the bar.

@@ -27,6 +27,7 @@ use super::shortcuts::Shortcuts;
 use super::shots::{OutFolder, free_name};
 use super::split::Split;
 use super::ui::{AddPanel, Note, Place};
+use super::undo::Undo;
 use super::weather::{self, OwnRain};
 use super::{added, export, model, saving, theme};
 
@@ -173,6 +174,8 @@ fn start(world: &mut World, base: LoadedScenario, prepared: PreparedScenario) {
         world.despawn(tool);
     }
     switch_scenario(world, prepared);
+    // It was about the scene that was there.
+    world.resource_mut::<Undo>().clear();
     model::light_shade(world, false);
     let mut emitters = world.query_filtered::<(Entity, &Name), With<SceneEntity>>();
     let named: Vec<_> =
@@ -257,6 +260,10 @@ pub fn travel(world: &mut World, seconds: f64) {
 pub fn take_back_stroke(world: &mut World) {
     let taken = if is_busy(world) { Err(RecordError::Busy) } else { record::take_back_stroke(world) };
     match taken {
+        // It was only about to be painted.
+        Ok(true) if world.resource::<Recording>().is_live() => {
+            world.resource_mut::<Note>().tell("took a stroke back");
+        }
         Ok(true) => set_out(world),
         Ok(false) => world.resource_mut::<Note>().tell("no stroke to take back"),
         Err(error) => world.resource_mut::<Note>().complain(error.to_string()),

@@ -29,6 +29,8 @@ struct Press {
     code: KeyCode,
     /// Together with Ctrl.
     control: bool,
+    /// Together with Shift.
+    shift: bool,
     /// It types a question mark.
     asks: bool,
     /// A field that has it is left.
@@ -47,6 +49,8 @@ pub struct Shortcuts {
     waiting: Vec<Press>,
     /// Ctrl is held.
     control: bool,
+    /// Shift is held.
+    shift: bool,
     /// Where the mouse was last, physical pixels.
     at: Option<Vec2>,
 }
@@ -57,9 +61,14 @@ impl Shortcuts {
         self.pressed.iter().any(|press| press.code == code && !press.control)
     }
 
-    /// Whether a key was pressed while Ctrl was held.
+    /// Whether a key was pressed while Ctrl was held, and Shift was not.
     pub fn with_control(&self, code: KeyCode) -> bool {
-        self.pressed.iter().any(|press| press.code == code && press.control)
+        self.pressed.iter().any(|press| press.code == code && press.control && !press.shift)
+    }
+
+    /// Whether a key was pressed while both were held.
+    pub fn with_control_and_shift(&self, code: KeyCode) -> bool {
+        self.pressed.iter().any(|press| press.code == code && press.control && press.shift)
     }
 
     /// Whether a key is held that was pressed without Ctrl.
@@ -85,6 +94,9 @@ impl Shortcuts {
         if is_control {
             self.control = key.state.is_pressed();
         }
+        if key.logical_key == Key::Shift {
+            self.shift = key.state.is_pressed();
+        }
         if !key.state.is_pressed() {
             self.held.retain(|held| *held != key.key_code);
             let same = self.waiting.iter_mut().filter(|press| press.code == key.key_code);
@@ -95,8 +107,14 @@ impl Shortcuts {
             return owner;
         }
         let ends = matches!(key.logical_key, Key::Enter | Key::Escape | Key::Tab);
-        let press =
-            Press { code: key.key_code, control: self.control, asks: asks(key), ends, is_released: false };
+        let press = Press {
+            code: key.key_code,
+            control: self.control,
+            shift: self.shift,
+            asks: asks(key),
+            ends,
+            is_released: false,
+        };
         match owner {
             Owner::Shortcuts => {
                 self.act(press);
@@ -134,7 +152,8 @@ impl Shortcuts {
 
     #[cfg(test)]
     pub fn of(code: KeyCode) -> Self {
-        let press = Press { code, control: false, asks: false, ends: false, is_released: false };
+        let press =
+            Press { code, control: false, shift: false, asks: false, ends: false, is_released: false };
         Self { pressed: vec![press], ..default() }
     }
 }
@@ -172,7 +191,7 @@ pub fn listen(
             }
             WindowEvent::KeyboardInput(key) => owner = shortcuts.hear(key, owner),
             WindowEvent::KeyboardFocusLost(_) => {
-                shortcuts.control = false;
+                (shortcuts.control, shortcuts.shift) = (false, false);
                 shortcuts.held.clear();
             }
             _ => {}
@@ -323,6 +342,15 @@ mod tests {
         assert_eq!(frame(&mut world), [false, true, false]);
         let shortcuts = world.resource::<Shortcuts>();
         assert!(shortcuts.with_control(KeyCode::KeyR) && !shortcuts.with_control(KeyCode::KeyM));
+        // Shift makes it another one.
+        control(&mut world, ButtonState::Pressed);
+        key(&mut world, KeyCode::ShiftLeft, Key::Shift, ButtonState::Pressed);
+        letter(&mut world, KeyCode::KeyR);
+        key(&mut world, KeyCode::ShiftLeft, Key::Shift, ButtonState::Released);
+        control(&mut world, ButtonState::Released);
+        frame(&mut world);
+        let shortcuts = world.resource::<Shortcuts>();
+        assert!(!shortcuts.with_control(KeyCode::KeyR) && shortcuts.with_control_and_shift(KeyCode::KeyR));
         // In a field it is neither.
         drawn(&mut world, true, false);
         control(&mut world, ButtonState::Pressed);

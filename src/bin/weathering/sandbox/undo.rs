@@ -1,23 +1,22 @@
-//! Taking brush strokes back, and emitters that were added or removed.
+//! Taking brush strokes back, and emitters that were added or removed, and doing so again.
 //!
 //! Before a stroke first touches a surface, what it holds is kept. Taking the stroke back puts that there again, whatever has
-//! happened on the surface since. What is oldest is forgotten when all together takes too much room.
+//! happened on the surface since, and keeps what was there instead, for the way back. What is oldest is forgotten when all
+//! together takes too much room. While a session is recorded, strokes are taken back by running it again (`record`).
 
 use std::collections::VecDeque;
 
 use bevy::prelude::*;
 use bevy_weathering::brush::BrushQueue;
-use bevy_weathering::clock::WeatheringClock;
-use bevy_weathering::matter::SurfaceMatter;
 use bevy_weathering::record::Recording;
-use bevy_weathering::wetting::SurfaceWater;
+use bevy_weathering::wetting::KeptSurface;
 
 use super::added::Done;
-use super::record;
 use super::shortcuts::Shortcuts;
 use super::ui::Note;
+use super::{brush, record};
 
-/// Bytes of all that is kept.
+/// Bytes of all that is kept, of what can be taken back and of what can be done again.
 const ROOM: usize = 256 << 20;
 /// Bytes that an emitter counts for.
 const EMITTER: usize = 1 << 10;
@@ -52,126 +51,330 @@ impl<T> Stack<T> {
     }
 
     fn clear(&mut self) {
-        self.entries.clear();
-        self.bytes = 0;
+        self.retain(|_| false);
+    }
+
+    /// Forgets all but some.
+    fn retain(&mut self, is_kept: impl Fn(&T) -> bool) {
+        self.entries.retain(|(_, entry)| is_kept(entry));
+        self.bytes = self.entries.iter().map(|(bytes, _)| bytes).sum();
+    }
+
+    fn len(&self) -> usize {
+        self.entries.len()
     }
 }
 
-/// A surface before a stroke.
+/// A surface before a stroke, or after it.
 struct Before {
     surface: Entity,
-    water: SurfaceWater,
-    matter: SurfaceMatter,
+    kept: KeptSurface,
 }
 
-/// Something that may be taken back.
+/// Something that may be taken back, or done again.
 enum Step {
     Stroke(Vec<Before>),
     Emitter(Done),
 }
 
-/// What may be taken back, and the stroke that is being painted.
+impl Step {
+    fn bytes(&self) -> usize {
+        match self {
+            Self::Stroke(stroke) => stroke.iter().map(|before| before.kept.bytes()).sum(),
+            Self::Emitter(_) => EMITTER,
+        }
+    }
+}
+
+/// What may be taken back and done again, and the stroke that is being painted.
 #[derive(Resource)]
 pub struct Undo {
     steps: Stack<Step>,
+    undone: Stack<Step>,
     current: Vec<Before>,
 }
 
 impl Default for Undo {
     fn default() -> Self {
-        Self { steps: Stack::new(ROOM), current: Vec::new() }
+        Self { steps: Stack::new(ROOM), undone: Stack::new(ROOM), current: Vec::new() }
     }
 }
 
 impl Undo {
     /// Keeps what a surface holds, if this stroke has not touched it yet.
-    pub fn keep(&mut self, surface: Entity, water: &SurfaceWater, matter: &SurfaceMatter) {
+    pub fn keep(&mut self, surface: Entity, kept: impl FnOnce() -> KeptSurface) {
         if self.current.iter().all(|before| before.surface != surface) {
-            self.current.push(Before { surface, water: water.clone(), matter: matter.clone() });
+            self.current.push(Before { surface, kept: kept() });
+            // It was done on what is painted over now.
+            self.undone.clear();
         }
     }
 
     /// The stroke is over.
     pub fn end_stroke(&mut self) {
         if !self.current.is_empty() {
-            let stroke = std::mem::take(&mut self.current);
-            let bytes = stroke.iter().map(|before| before.water.bytes() + before.matter.bytes()).sum();
-            self.steps.push(bytes, Step::Stroke(stroke));
+            let stroke = Step::Stroke(std::mem::take(&mut self.current));
+            self.steps.push(stroke.bytes(), stroke);
         }
     }
 
     /// Keeps what was done to an emitter.
     pub fn keep_emitter(&mut self, done: Done) {
         self.end_stroke();
+        self.undone.clear();
         self.steps.push(EMITTER, Step::Emitter(done));
     }
 
     /// Nothing of what was done is there any more.
     pub fn clear(&mut self) {
         self.steps.clear();
+        self.undone.clear();
         self.current.clear();
     }
 
-    /// How much may be taken back: strokes and emitters.
-    pub fn count(&self) -> usize {
-        self.steps.entries.len()
+    /// All surfaces begin anew, and emitters stay as they are. Whether any stroke is gone for good with that.
+    pub fn forget_strokes(&mut self) -> bool {
+        self.end_stroke();
+        let before = self.steps.len() + self.undone.len();
+        for stack in [&mut self.steps, &mut self.undone] {
+            stack.retain(|step| matches!(step, Step::Emitter(_)));
+        }
+        self.steps.len() + self.undone.len() < before
+    }
+
+    /// How much may be taken back, and how much done again: strokes and emitters.
+    pub fn counts(&self) -> [usize; 2] {
+        [self.steps.len(), self.undone.len()]
     }
 }
 
 pub fn plugin(app: &mut App) {
-    app.init_resource::<Undo>()
-        .add_systems(Update, press)
-        // Before anything new is painted on what begins anew.
-        .add_systems(PreUpdate, forget);
+    app.init_resource::<Undo>().add_systems(Update, press);
 }
 
 fn press(keys: Res<Shortcuts>, mut commands: Commands) {
-    if keys.with_control(KeyCode::KeyZ) {
+    if keys.with_control_and_shift(KeyCode::KeyZ) {
+        commands.queue(redo);
+    } else if keys.with_control(KeyCode::KeyZ) {
         commands.queue(undo);
     }
 }
 
 /// Takes back what was done last. While a session is recorded, the last stroke, by running it again without the stroke.
 pub fn undo(world: &mut World) {
+    // What is painted with the button still held is taken back as it is, and not painted on.
+    brush::let_go(world);
     if world.contains_resource::<Recording>() {
         record::take_back_stroke(world);
         return;
     }
     let mut undo = world.resource_mut::<Undo>();
     undo.end_stroke();
-    let last = undo.steps.pop();
-    let told = match last {
-        Some(Step::Stroke(stroke)) => put_back(world, &stroke),
-        Some(Step::Emitter(done)) => done.take_back(world),
-        None => "nothing to take back",
+    let Some(last) = undo.steps.pop() else {
+        return world.resource_mut::<Note>().tell("nothing to take back");
     };
-    world.resource_mut::<Note>().tell(told);
+    if let Some(step) = exchange(world, last, "took a stroke back") {
+        world.resource_mut::<Undo>().undone.push(step.bytes(), step);
+    }
 }
 
-/// Surfaces as they were before a stroke.
-fn put_back(world: &mut World, stroke: &[Before]) -> &'static str {
+/// Does again what was taken back last, if nothing else was done since.
+pub fn redo(world: &mut World) {
+    if world.contains_resource::<Recording>() {
+        // A stroke that is taken back out of a session has never been.
+        return world.resource_mut::<Note>().tell("nothing is done again while a session is recorded");
+    }
+    let mut undo = world.resource_mut::<Undo>();
+    undo.end_stroke();
+    let Some(last) = undo.undone.pop() else {
+        return world.resource_mut::<Note>().tell("nothing to do again");
+    };
+    if let Some(step) = exchange(world, last, "brought a stroke back") {
+        world.resource_mut::<Undo>().steps.push(step.bytes(), step);
+    }
+}
+
+/// Makes it as it was, and tells so; what leads the other way. `of_stroke`: what is told of a stroke.
+fn exchange(world: &mut World, step: Step, of_stroke: &str) -> Option<Step> {
+    let stroke = match step {
+        Step::Stroke(stroke) => stroke,
+        Step::Emitter(done) => {
+            let (told, back) = done.take_back(world);
+            world.resource_mut::<Note>().tell(told);
+            return back.map(Step::Emitter);
+        }
+    };
+    let (back, wrong) = put_back(world, stroke);
+    let mut note = world.resource_mut::<Note>();
+    match (wrong.is_empty(), back.is_empty()) {
+        (true, _) => note.tell(of_stroke),
+        (false, false) => note.complain(format!("{of_stroke}, but not everywhere: {}", wrong.join("; "))),
+        (false, true) => note.complain(format!("the stroke stays as it is: {}", wrong.join("; "))),
+    }
+    (!back.is_empty()).then_some(Step::Stroke(back))
+}
+
+/// Surfaces as they were; as they have been until now, and why others cannot be as they were.
+fn put_back(world: &mut World, stroke: Vec<Before>) -> (Vec<Before>, Vec<String>) {
     // Its last touches may still wait for a tick.
-    world.resource_mut::<BrushQueue>().0.clear();
-    let mut surfaces = world.query::<(&mut SurfaceWater, &mut SurfaceMatter)>();
-    for Before { surface, water, matter } in stroke {
-        if let Ok((mut there, mut beside)) = surfaces.get_mut(world, *surface) {
-            there.put_back(&mut beside, water, matter);
+    if let Some(mut queue) = world.get_resource_mut::<BrushQueue>() {
+        queue.0.clear();
+    }
+    let (mut back, mut wrong) = (Vec::new(), Vec::new());
+    for Before { surface, kept } in stroke {
+        let now = KeptSurface::of(world, surface);
+        match kept.put_back(world, surface) {
+            Ok(()) => back.extend(now.map(|kept| Before { surface, kept })),
+            Err(why) => {
+                let name = world.get::<Name>(surface).map_or("a surface", Name::as_str);
+                wrong.push(format!("{name} {why}"));
+            }
         }
     }
-    "took a stroke back"
-}
-
-/// What was painted before the scene began anew is no more.
-fn forget(clock: Res<WeatheringClock>, mut undo: ResMut<Undo>, mut last: Local<u32>) {
-    if clock.tick() < *last {
-        undo.clear();
-    }
-    *last = clock.tick();
+    (back, wrong)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use bevy::math::Affine3A;
+    use bevy_weathering::collision::{MeshBvh, MeshTriangles, SurfaceCollider};
+    use bevy_weathering::matter::SurfaceMatter;
+    use bevy_weathering::overlay::Wrap;
+    use bevy_weathering::wetting::{SurfaceWater, TexelGeometry, WetGeometry};
+
     use super::*;
+
+    const WRAP: [Wrap; 2] = [Wrap::Clamp; 2];
+
+    fn world() -> World {
+        let mut world = World::new();
+        world.init_resource::<Undo>();
+        world.init_resource::<Note>();
+        world.init_resource::<BrushQueue>();
+        world
+    }
+
+    /// A dry plate.
+    fn plate(world: &mut World, name: &'static str) -> Entity {
+        let mesh = Mesh::from(Plane3d::new(Vec3::Y, Vec2::ONE));
+        let bvh = Arc::new(MeshBvh::build(MeshTriangles::from_mesh(&mesh).unwrap()));
+        let geometry = TexelGeometry::new(bvh.triangles(), &Affine3A::IDENTITY, Vec3::Y, 32, WRAP);
+        let water = SurfaceWater::of_size(32, WRAP, geometry.mean_mm2());
+        let parts = (Name::new(name), SurfaceCollider(bvh), WetGeometry(Arc::new(geometry)));
+        world.spawn((parts, water, SurfaceMatter::default())).id()
+    }
+
+    /// A stroke over surfaces, after which they are wet.
+    fn paint(world: &mut World, surfaces: &[Entity]) {
+        for &surface in surfaces {
+            let kept = KeptSurface::of(world, surface).unwrap();
+            world.resource_mut::<Undo>().keep(surface, || kept);
+            let geometry = world.get::<WetGeometry>(surface).unwrap().0.clone();
+            world.get_mut::<SurfaceWater>(surface).unwrap().cover(&geometry, 0.1, 0.0, 1);
+        }
+    }
+
+    fn film(world: &World, surface: Entity) -> u64 {
+        let texels = world.get::<SurfaceWater>(surface).unwrap().texels();
+        texels.iter().map(|texel| u64::from(texel.film)).sum()
+    }
+
+    /// What was told last, and whether it is a complaint.
+    fn told(world: &World) -> (String, bool) {
+        let (text, is_wrong, _) = world.resource::<Note>().0.clone().unwrap();
+        (text, is_wrong)
+    }
+
+    #[test]
+    fn a_stroke_over_several_surfaces_is_taken_back_and_done_again_on_all_of_them() {
+        let mut world = world();
+        let plates = ["left", "right"].map(|name| plate(&mut world, name));
+        let films = |world: &World| plates.map(|plate| film(world, plate));
+        paint(&mut world, &plates);
+        let once = films(&world);
+        assert!(once.iter().all(|&film| film > 0));
+        // Still being painted, and yet all that there is to take back.
+        undo(&mut world);
+        assert_eq!((films(&world), told(&world).1), ([0, 0], false));
+        redo(&mut world);
+        assert_eq!((films(&world), told(&world).1), (once, false));
+        redo(&mut world);
+        assert_eq!(told(&world).0, "nothing to do again");
+
+        paint(&mut world, &plates[..1]);
+        world.resource_mut::<Undo>().end_stroke();
+        assert_eq!(films(&world), [2 * once[0], once[1]]);
+        undo(&mut world);
+        assert_eq!((films(&world), world.resource::<Undo>().counts()), (once, [1, 1]));
+        undo(&mut world);
+        assert_eq!((films(&world), world.resource::<Undo>().counts()), ([0, 0], [0, 2]));
+        // What is painted now is not below what was taken back.
+        paint(&mut world, &plates[1..]);
+        assert_eq!(world.resource::<Undo>().counts(), [0, 0]);
+    }
+
+    #[test]
+    fn where_a_stroke_cannot_be_taken_back_it_is_said_and_not_claimed() {
+        let mut world = world();
+        let plates = ["left", "right"].map(|name| plate(&mut world, name));
+        paint(&mut world, &plates);
+        // Others needed its room.
+        world.entity_mut(plates[0]).remove::<SurfaceWater>();
+        undo(&mut world);
+        let (text, is_wrong) = told(&world);
+        assert!(is_wrong && text.contains("left has no maps") && !text.contains("right"), "{text}");
+        assert_eq!(film(&world, plates[1]), 0);
+        redo(&mut world);
+        assert!(film(&world, plates[1]) > 0 && !told(&world).1);
+        world.despawn(plates[1]);
+        undo(&mut world);
+        let (text, is_wrong) = told(&world);
+        assert!(is_wrong && text.contains("is no more") && !text.contains("took"), "{text}");
+        assert_eq!(world.resource::<Undo>().counts(), [0, 0]);
+    }
+
+    #[test]
+    fn strokes_go_with_what_they_were_painted_on_and_emitters_stay() {
+        let mut world = world();
+        let plates = [plate(&mut world, "left")];
+        assert!(!world.resource_mut::<Undo>().forget_strokes());
+        paint(&mut world, &plates);
+        world.resource_mut::<Undo>().keep_emitter(Done::Added(7));
+        paint(&mut world, &plates);
+        undo(&mut world);
+        assert_eq!(world.resource::<Undo>().counts(), [2, 1]);
+        paint(&mut world, &plates);
+        // One of them still being painted.
+        assert!(world.resource_mut::<Undo>().forget_strokes());
+        assert_eq!(world.resource::<Undo>().counts(), [1, 0]);
+        let before = film(&world, plates[0]);
+        undo(&mut world);
+        assert_eq!((told(&world).0.as_str(), film(&world, plates[0])), ("the emitter has gone", before));
+        undo(&mut world);
+        assert_eq!(told(&world).0, "nothing to take back");
+    }
+
+    #[test]
+    fn shift_turns_the_key_round() {
+        let mut world = world();
+        world.init_resource::<ButtonInput<KeyCode>>();
+        let mut hit = |held: &[KeyCode]| {
+            let mut keys = ButtonInput::<KeyCode>::default();
+            held.iter().for_each(|&key| keys.press(key));
+            keys.press(KeyCode::KeyZ);
+            world.insert_resource(keys);
+            world.resource_mut::<Note>().0 = None;
+            world.run_system_cached(press).unwrap();
+            world.resource::<Note>().0.as_ref().map(|(text, ..)| text.clone())
+        };
+        assert_eq!(hit(&[]), None);
+        assert_eq!(hit(&[KeyCode::ShiftLeft]), None);
+        assert_eq!(hit(&[KeyCode::ControlRight]).as_deref(), Some("nothing to take back"));
+        let both = [KeyCode::ControlLeft, KeyCode::ShiftRight];
+        assert_eq!(hit(&both).as_deref(), Some("nothing to do again"));
+    }
 
     #[test]
     fn the_last_comes_back_first_and_the_oldest_are_forgotten() {

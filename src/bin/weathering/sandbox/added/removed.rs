@@ -18,6 +18,8 @@ pub enum Done {
     Gone(Box<(Name, Emitter, Transform)>),
     /// It is the scenario's, and was removed.
     Removed(Removed),
+    /// It is the scenario's, and was brought back.
+    BroughtBack(Entity),
 }
 
 /// An emitter of the scenario before it was removed.
@@ -36,9 +38,16 @@ pub fn remove(world: &mut World, emitter: Entity) {
         }
         return;
     }
-    let Ok(mut entity) = world.get_entity_mut(emitter) else { return };
-    let Some(was) = entity.get::<Emitter>().cloned() else { return };
-    let done = if entity.contains::<AddedEmitter>() {
+    if let Some(done) = take_away(world, emitter) {
+        world.resource_mut::<Undo>().keep_emitter(done);
+    }
+}
+
+/// Takes an emitter away; what was done, if it was one.
+fn take_away(world: &mut World, emitter: Entity) -> Option<Done> {
+    let mut entity = world.get_entity_mut(emitter).ok()?;
+    let was = entity.get::<Emitter>().cloned()?;
+    Some(if entity.contains::<AddedEmitter>() {
         let name = entity.get::<Name>().cloned().unwrap_or_default();
         let transform = entity.get::<Transform>().copied().unwrap_or_default();
         entity.despawn();
@@ -48,29 +57,32 @@ pub fn remove(world: &mut World, emitter: Entity) {
         // Or its working hours would switch it on again.
         entity.insert((RemovedEmitter, ByHand, Emitter { enabled: false, ..was }));
         Done::Removed(Removed { emitter, was_on, was_by_hand })
-    };
-    world.resource_mut::<Undo>().keep_emitter(done);
+    })
 }
 
 impl Done {
-    /// Takes it back; tells what was done.
-    pub fn take_back(self, world: &mut World) -> &'static str {
+    /// Takes it back; tells what was done, and what it takes to have it the other way round again.
+    pub fn take_back(self, world: &mut World) -> (&'static str, Option<Self>) {
+        let gone = ("the emitter has gone", None);
         match self {
             Self::Added(stream) => {
                 let mut added = world.query_filtered::<(Entity, &Emitter), With<AddedEmitter>>();
                 let found = added.iter(world).find(|(_, emitter)| emitter.stream == stream);
-                if let Some(emitter) = found.map(|(emitter, _)| emitter) {
-                    world.despawn(emitter);
-                }
-                "took the emitter away"
+                let emitter = found.map(|(emitter, _)| emitter);
+                let done = emitter.and_then(|emitter| take_away(world, emitter));
+                done.map_or(gone, |done| ("took the emitter away", Some(done)))
             }
             Self::Gone(emitter) => {
                 let (name, emitter, transform) = *emitter;
+                let stream = emitter.stream;
                 spawn(world, name, emitter, transform);
-                "brought the emitter back"
+                ("brought the emitter back", Some(Self::Added(stream)))
+            }
+            Self::BroughtBack(emitter) => {
+                take_away(world, emitter).map_or(gone, |done| ("took the emitter away", Some(done)))
             }
             Self::Removed(Removed { emitter, was_on, was_by_hand }) => {
-                let Ok(mut entity) = world.get_entity_mut(emitter) else { return "the emitter has gone" };
+                let Ok(mut entity) = world.get_entity_mut(emitter) else { return gone };
                 if entity.take::<RemovedEmitter>().is_some() {
                     if let Some(mut emitter) = entity.get_mut::<Emitter>() {
                         emitter.enabled = was_on;
@@ -79,7 +91,7 @@ impl Done {
                         entity.remove::<ByHand>();
                     }
                 }
-                "brought the emitter back"
+                ("brought the emitter back", Some(Self::BroughtBack(emitter)))
             }
         }
     }
@@ -89,7 +101,7 @@ impl Done {
 mod tests {
     use bevy_weathering::scenario::SceneEntity;
 
-    use super::super::super::undo::undo;
+    use super::super::super::undo::{redo, undo};
     use super::super::is_any;
     use super::*;
 
@@ -123,6 +135,18 @@ mod tests {
         undo(&mut world);
         assert!(added(&mut world).is_empty());
         undo(&mut world);
+        // All of it again.
+        redo(&mut world);
+        let [(_, 7)] = added(&mut world)[..] else { panic!("it was not added again") };
+        redo(&mut world);
+        assert!(added(&mut world).is_empty());
+        redo(&mut world);
+        undo(&mut world);
+        assert_eq!(added(&mut world).len(), 1);
+        assert_eq!(world.resource::<Undo>().counts(), [1, 1]);
+        // Something else was done.
+        world.resource_mut::<Undo>().keep_emitter(Done::Added(8));
+        assert_eq!(world.resource::<Undo>().counts(), [2, 0]);
     }
 
     #[test]
@@ -139,6 +163,12 @@ mod tests {
             undo(&mut world);
             assert!(world.get::<Emitter>(emitter).unwrap().enabled);
             assert!(world.get::<RemovedEmitter>(emitter).is_none());
+            assert_eq!(world.get::<ByHand>(emitter).is_some(), was_by_hand);
+            redo(&mut world);
+            assert!(!world.get::<Emitter>(emitter).unwrap().enabled);
+            assert!(world.get::<RemovedEmitter>(emitter).is_some());
+            undo(&mut world);
+            assert!(world.get::<Emitter>(emitter).unwrap().enabled);
             assert_eq!(world.get::<ByHand>(emitter).is_some(), was_by_hand);
         }
     }

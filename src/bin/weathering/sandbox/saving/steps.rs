@@ -75,6 +75,7 @@ pub(super) fn begin_restoring(world: &mut World, folder: &Path) -> Result<(), St
     put_tools_away(world);
     world.resource_mut::<Time<Virtual>>().pause();
     reset_scenario(world);
+    world.resource_mut::<Undo>().forget_strokes();
     world.insert_resource(ShownTime::Now);
     world.resource_mut::<Saving>().0 = Some(Step::Clearing { folder: folder.into(), scene, frames: SETTLE });
     Ok(())
