@@ -36,12 +36,7 @@ pub fn plugin(app: &mut App) {
 }
 
 /// Follows whether there is something to lose. That a scene is saved is told by those who do it.
-fn notice(
-    pointed: Res<Pointed>,
-    settings: Res<Settings>,
-    opened: Res<Opened>,
-    mut unsaved: ResMut<Unsaved>,
-) {
+fn notice(pointed: Res<Pointed>, settings: Res<Settings>, opened: Res<Opened>, mut unsaved: ResMut<Unsaved>) {
     if pointed.pressed && settings.tool != Tool::Probe {
         unsaved.0 = true;
     }

@@ -26,7 +26,10 @@ enum Owner {
 /// A key that was pressed.
 #[derive(Debug, Clone, Copy)]
 struct Press {
+    /// Where it is on the keyboard.
     code: KeyCode,
+    /// The small letter on it, wherever that is.
+    letter: Option<char>,
     /// Together with Ctrl.
     control: bool,
     /// Together with Shift.
@@ -36,6 +39,24 @@ struct Press {
     /// A field that has it is left.
     ends: bool,
     is_released: bool,
+}
+
+#[cfg(test)]
+impl Press {
+    const NONE: Self = Self {
+        code: KeyCode::F35,
+        letter: None,
+        control: false,
+        shift: false,
+        asks: false,
+        ends: false,
+        is_released: false,
+    };
+}
+
+fn letter_of(key: &Key) -> Option<char> {
+    let Key::Character(text) = key else { return None };
+    text.chars().next().map(|letter| letter.to_ascii_lowercase())
 }
 
 /// Keys that no panel takes.
@@ -61,14 +82,14 @@ impl Shortcuts {
         self.pressed.iter().any(|press| press.code == code && !press.control)
     }
 
-    /// Whether a key was pressed while Ctrl was held, and Shift was not.
-    pub fn with_control(&self, code: KeyCode) -> bool {
-        self.pressed.iter().any(|press| press.code == code && press.control && !press.shift)
+    /// Whether the key with this small letter was pressed while Ctrl was held, and Shift was not.
+    pub fn with_control(&self, letter: char) -> bool {
+        self.pressed.iter().any(|press| press.letter == Some(letter) && press.control && !press.shift)
     }
 
-    /// Whether a key was pressed while both were held.
-    pub fn with_control_and_shift(&self, code: KeyCode) -> bool {
-        self.pressed.iter().any(|press| press.code == code && press.control && press.shift)
+    /// Whether the key with this small letter was pressed while both were held.
+    pub fn with_control_and_shift(&self, letter: char) -> bool {
+        self.pressed.iter().any(|press| press.letter == Some(letter) && press.control && press.shift)
     }
 
     /// Whether a key is held that was pressed without Ctrl.
@@ -109,6 +130,7 @@ impl Shortcuts {
         let ends = matches!(key.logical_key, Key::Enter | Key::Escape | Key::Tab);
         let press = Press {
             code: key.key_code,
+            letter: letter_of(&key.logical_key),
             control: self.control,
             shift: self.shift,
             asks: asks(key),
@@ -152,8 +174,13 @@ impl Shortcuts {
 
     #[cfg(test)]
     pub fn of(code: KeyCode) -> Self {
-        let press =
-            Press { code, control: false, shift: false, asks: false, ends: false, is_released: false };
+        let press = Press { code, ..Press::NONE };
+        Self { pressed: vec![press], ..default() }
+    }
+
+    #[cfg(test)]
+    pub fn typed(letter: char, control: bool, shift: bool) -> Self {
+        let press = Press { letter: Some(letter), control, shift, ..Press::NONE };
         Self { pressed: vec![press], ..default() }
     }
 }
@@ -229,7 +256,13 @@ mod tests {
     }
 
     fn letter(world: &mut World, code: KeyCode) {
-        tap(world, code, Key::Character("x".into()));
+        let letter = match code {
+            KeyCode::KeyM => "m",
+            KeyCode::KeyR => "R",
+            KeyCode::KeyW => "w",
+            _ => "x",
+        };
+        tap(world, code, Key::Character(letter.into()));
     }
 
     fn control(world: &mut World, state: ButtonState) {
@@ -341,7 +374,7 @@ mod tests {
         letter(&mut world, KeyCode::KeyM);
         assert_eq!(frame(&mut world), [false, true, false]);
         let shortcuts = world.resource::<Shortcuts>();
-        assert!(shortcuts.with_control(KeyCode::KeyR) && !shortcuts.with_control(KeyCode::KeyM));
+        assert!(shortcuts.with_control('r') && !shortcuts.with_control('m'));
         // Shift makes it another one.
         control(&mut world, ButtonState::Pressed);
         key(&mut world, KeyCode::ShiftLeft, Key::Shift, ButtonState::Pressed);
@@ -350,13 +383,13 @@ mod tests {
         control(&mut world, ButtonState::Released);
         frame(&mut world);
         let shortcuts = world.resource::<Shortcuts>();
-        assert!(!shortcuts.with_control(KeyCode::KeyR) && shortcuts.with_control_and_shift(KeyCode::KeyR));
+        assert!(!shortcuts.with_control('r') && shortcuts.with_control_and_shift('r'));
         // In a field it is neither.
         drawn(&mut world, true, false);
         control(&mut world, ButtonState::Pressed);
         letter(&mut world, KeyCode::KeyR);
         assert_eq!(frame(&mut world), [false; 3]);
-        assert!(!world.resource::<Shortcuts>().with_control(KeyCode::KeyR));
+        assert!(!world.resource::<Shortcuts>().with_control('r'));
     }
 
     #[test]

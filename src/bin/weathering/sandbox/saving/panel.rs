@@ -21,7 +21,7 @@ use super::steps::{begin, begin_restoring};
 pub(super) struct Folder(Option<String>);
 
 pub(super) fn press(keys: Res<Shortcuts>, mut commands: Commands) {
-    if keys.with_control(KeyCode::KeyS) {
+    if keys.with_control('s') {
         commands.queue(save);
     }
 }
