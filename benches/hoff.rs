@@ -33,6 +33,8 @@
 
 use bevy::math::{Vec2, Vec3};
 
+use crate::scene::Random;
+
 /// Slack of the inside test, in barycentric weight: particles must not slip through the edge between two
 /// triangles, whose planes round differently.
 const EDGE_SLACK: f32 = 1e-5;
@@ -396,17 +398,12 @@ fn check_sphere(reject: HoffReject) {
     let uvs = vec![[Vec2::ZERO, Vec2::X, Vec2::Y]; triangles.len()];
     let mut system = HoffSystem::new(std::slice::from_ref(&triangles), &[uvs], reject);
 
-    let mut state = 1_u32;
-    let mut random = || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (state >> 8) as f32 / (1 << 23) as f32 - 1.0
-    };
-    let mut vector = || Vec3::new(random(), random(), random());
+    let mut random = Random::new();
     let shots: Vec<_> = (0..SHOTS)
         .map(|i| {
-            let start = vector().normalize_or(Vec3::X) * 3.0;
+            let start = random.vector().normalize_or(Vec3::X) * 3.0;
             // The first half aims well inside, the second anywhere, most of it past the sphere.
-            let target = vector() * if i < SHOTS / 2 { 0.5 } else { 3.0 };
+            let target = random.vector() * if i < SHOTS / 2 { 0.5 } else { 3.0 };
             HoffParticle { position: start, velocity: target - start, age: 0.0 }
         })
         .collect();

@@ -37,6 +37,8 @@ pub mod scenario;
 pub mod scenes;
 pub mod schedule;
 pub mod stamps;
+#[cfg(test)]
+mod test_random;
 pub mod unwrap;
 pub mod weather;
 pub mod wetmap;

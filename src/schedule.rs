@@ -41,7 +41,7 @@ pub enum WeatheringSystems {
     Last,
 }
 
-/// The last step of [`WeatheringSystems::Trace`]: despawning what hit or expired.
+/// The last step of [`WeatheringSystems::Trace`]: what hit or expired leaves its columns.
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct RetireSystems;
 

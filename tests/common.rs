@@ -41,6 +41,15 @@ impl Random {
     }
 }
 
+/// Whether tests that draw are left out, by `WEATHERING_SKIP_GPU=1`: then it is printed.
+pub fn skips_gpu() -> bool {
+    let skips = std::env::var("WEATHERING_SKIP_GPU").is_ok_and(|value| value == "1");
+    if skips {
+        eprintln!("skipped: needs a GPU, and WEATHERING_SKIP_GPU=1");
+    }
+    skips
+}
+
 /// The bunny of 1,000 triangles.
 pub fn bunny() -> MeshTriangles {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models/bunny_1000.glb");

@@ -106,8 +106,7 @@ fn one_two_and_eight_threads_agree() {
 
 #[test]
 fn what_is_drawn_and_what_is_not_agree_on_every_driver() {
-    if std::env::var("WEATHERING_SKIP_GPU").is_ok_and(|value| value == "1") {
-        eprintln!("skipped: needs a GPU, and WEATHERING_SKIP_GPU=1");
+    if crate::common::skips_gpu() {
         return;
     }
     let other = swiftshader();

@@ -139,8 +139,7 @@ fn plots_have_lines_and_units() {
 
 #[test]
 fn pictures_become_a_video_and_a_contact_sheet() {
-    if std::env::var("WEATHERING_SKIP_GPU").is_ok_and(|value| value == "1") {
-        eprintln!("skipped: needs a GPU, and WEATHERING_SKIP_GPU=1");
+    if crate::common::skips_gpu() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();

@@ -326,8 +326,7 @@ fn the_maps_hold_the_water_in_micrometres() {
 
 #[test]
 fn pictures_come_with_the_same_digest() {
-    if std::env::var("WEATHERING_SKIP_GPU").is_ok_and(|value| value == "1") {
-        eprintln!("skipped: needs a GPU, and WEATHERING_SKIP_GPU=1");
+    if crate::common::skips_gpu() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();

@@ -198,8 +198,7 @@ fn expectations_decide_how_a_run_ends() {
 
 #[test]
 fn pictures_are_taken_by_name() {
-    if std::env::var("WEATHERING_SKIP_GPU").is_ok_and(|value| value == "1") {
-        eprintln!("skipped: needs a GPU, and WEATHERING_SKIP_GPU=1");
+    if crate::common::skips_gpu() {
         return;
     }
     let folder = Folder::new();

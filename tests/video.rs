@@ -47,8 +47,7 @@ fn middle(video: &Path, picture: u32, size: [usize; 2]) -> [u8; 3] {
 
 #[test]
 fn a_video_has_all_pictures_in_their_size_and_at_their_pace() {
-    if std::env::var("WEATHERING_SKIP_GPU").is_ok_and(|value| value == "1") {
-        eprintln!("skipped: needs a GPU, and WEATHERING_SKIP_GPU=1");
+    if crate::common::skips_gpu() {
         return;
     }
     if !is_there("ffmpeg") || !is_there("ffprobe") {

@@ -109,7 +109,7 @@ impl Plugin for CollisionPlugin {
                 )
                     .chain()
                     .in_set(WeatheringSystems::Trace)
-                    // The dead are despawned when nobody needs them any more.
+                    // The dead leave their columns when nobody needs them any more.
                     .before(RetireSystems),
             );
     }

@@ -56,8 +56,7 @@ pub(crate) fn is_at_rest(water: &SurfaceWater, matter: &SurfaceMatter, weather: 
 
 #[cfg(test)]
 mod tests {
-    use super::super::settle::Deposit;
-    use super::super::test_world::{Ground, Place, assert_balanced};
+    use super::super::test_world::{Ground, Place, assert_balanced, bump};
     use super::super::texel::MatterKind;
     use super::*;
     use rand_pcg::Pcg32;
@@ -78,11 +77,7 @@ mod tests {
                     let radius = [0; 2].map(|_| 128 + random(6 * 256) as i32);
                     // Snow comes by the centimetre.
                     let most = if kind == MatterKind::Snow { 1_200_000 } else { 30_000 };
-                    ground.put(
-                        &place,
-                        tick,
-                        Deposit { center, radius, kind, volume_nl: random(most), stamp: None },
-                    );
+                    ground.put(&place, tick, bump(kind, random(most), center, radius));
                 }
                 3 | 4 => ground.rain(&place, tick, random(4)),
                 5 if random(20) == 0 => {
@@ -132,14 +127,7 @@ mod tests {
     fn snow_goes_on_sliding_where_the_water_under_it_began_anew() {
         let place = Place::slope(60.0, 32, 0.01).with(|weather| weather.temperature_c = -5.0);
         let mut ground = Ground::dry(&place);
-        let heavy = Deposit {
-            center: [4096; 2],
-            radius: [15 * 256; 2],
-            kind: MatterKind::Snow,
-            volume_nl: 900_000_000,
-            stamp: None,
-        };
-        ground.put(&place, 1, heavy);
+        ground.put(&place, 1, bump(MatterKind::Snow, 900_000_000, [4096; 2], [15 * 256; 2]));
         ground.water.reset();
         assert!(!ground.water.is_wet());
         (2..=20 * Place::HZ).for_each(|tick| {
@@ -157,16 +145,10 @@ mod tests {
         let rests =
             |ground: &Ground, place: &Place| is_at_rest(&ground.water, &ground.matter, &place.weather);
         assert!(rests(&ground, &mild));
-        let whole = Deposit {
-            center: [4096; 2],
-            radius: [31 * 128; 2],
-            kind: MatterKind::Dust,
-            volume_nl: 9_000,
-            stamp: None,
-        };
-        ground.put(&frost, 1, whole);
+        let whole = |kind: MatterKind| bump(kind, 9_000, [4096; 2], [31 * 128; 2]);
+        ground.put(&frost, 1, whole(MatterKind::Dust));
         assert!(rests(&ground, &mild));
-        ground.put(&frost, 1, Deposit { kind: MatterKind::Snow, ..whole });
+        ground.put(&frost, 1, whole(MatterKind::Snow));
         (2..=2 * Place::HZ).for_each(|tick| {
             ground.step(&frost, tick);
         });

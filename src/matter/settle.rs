@@ -127,7 +127,7 @@ fn is_wet(water: &mut SurfaceWater, now: &Now, texel: u32) -> bool {
 #[cfg(test)]
 mod tests {
     use super::super::TexelMatter;
-    use super::super::test_world::{Ground, Place, assert_balanced};
+    use super::super::test_world::{Ground, Place, assert_balanced, bump};
     use super::*;
     use crate::collision::MeshTriangles;
     use crate::material::PorousMaterial;
@@ -137,7 +137,7 @@ mod tests {
     use std::sync::Arc;
 
     fn stamp(kind: MatterKind, volume_nl: u32) -> Deposit {
-        Deposit { center: [8 * 256; 2], radius: [3 * 256, 2 * 256], kind, volume_nl, stamp: None }
+        bump(kind, volume_nl, [8 * 256; 2], [3 * 256, 2 * 256])
     }
 
     #[test]
@@ -231,7 +231,7 @@ mod tests {
                     let mut ground = Ground::dry(&freezing);
                     let center = [column * 256 + 130, 20 * 256];
                     let radius = [radius * 256; 2];
-                    ground.put(&freezing, 1, Deposit { center, radius, ..stamp(kind, 10_007) });
+                    ground.put(&freezing, 1, bump(kind, 10_007, center, radius));
                     let lies = |texel: &TexelMatter| texel.soil() + u64::from(texel.snow);
                     let texels = (0u32..).zip(&ground.matter.texels);
                     let here: u64 = texels

@@ -122,14 +122,15 @@ fn by_coverage(volume_nl: u32, covered: &[(u32, u32)], give: &mut impl FnMut(u32
 mod tests {
     use super::*;
     use crate::matter::MatterKind;
+    use crate::matter::test_world::bump;
     use crate::overlay::CpuMaps;
     use crate::stamps::{Stamp, StampKind, StampOptions, StampSet, stamps};
 
     const SIZE: u32 = 64;
 
     fn deposit(radius: i32, volume_nl: u32, stamp: Option<DepositStamp>) -> Deposit {
-        let (center, radius) = ([32 * 256 + 77, 31 * 256 + 5], [radius; 2]);
-        Deposit { center, radius, kind: MatterKind::Dust, volume_nl, stamp }
+        let center = [32 * 256 + 77, 31 * 256 + 5];
+        Deposit { stamp, ..bump(MatterKind::Dust, volume_nl, center, [radius; 2]) }
     }
 
     /// As it lies, turned by an angle.

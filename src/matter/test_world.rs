@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use bevy::math::{Affine3A, Vec2, Vec3};
 
-use super::SurfaceMatter;
 use super::advance::{MatterScratch, advance_matter};
 use super::settle::{self, Deposit, deposit};
+use super::{MatterKind, SurfaceMatter};
 use crate::collision::MeshTriangles;
 use crate::emitter::Source;
 use crate::material::PorousMaterial;
@@ -79,6 +79,11 @@ impl Place {
     pub(super) fn texels(&self) -> u32 {
         self.geometry.size() * self.geometry.size()
     }
+}
+
+/// Matter that comes as a round bump: nanolitres; where, and half of its width and height, in 1/256 texel.
+pub(crate) fn bump(kind: MatterKind, volume_nl: u32, center: [i32; 2], radius: [i32; 2]) -> Deposit {
+    Deposit { center, radius, kind, volume_nl, stamp: None }
 }
 
 /// What lies on it.

@@ -148,6 +148,7 @@ pub fn integrate_particles(
 mod tests {
     use super::super::{Lifespan, Particle};
     use super::*;
+    use crate::test_random::Random;
 
     fn world_with(effect: WeatherEffect, forces: Forces) -> (World, EffectIndex) {
         let mut world = World::new();
@@ -232,13 +233,9 @@ mod tests {
 
     #[test]
     fn four_together_move_as_each_would_alone() {
-        let mut random = 1u32;
-        let mut next = |scale: f32| {
-            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            ((random >> 8) as f32 / 8_388_608.0 - 1.0) * scale
-        };
+        let mut random = Random(1);
         for _ in 0..1000 {
-            let mut vector = |scale: f32| Vec3::new(next(scale), next(scale), next(scale));
+            let mut vector = |scale: f32| random.in_cube(scale);
             let (mut positions, mut velocities) =
                 ([(); ROW].map(|()| vector(9.0)), [(); ROW].map(|()| vector(20.0)));
             let airs = [(); ROW].map(|()| vector(15.0));

@@ -365,6 +365,7 @@ fn drop_nl(water: &SurfaceWater, donor: &Donor) -> Option<u32> {
 mod tests {
     use super::*;
     use crate::material::PorousMaterial;
+    use crate::test_random::Random;
     use crate::weather::{DryingClock, Weather};
     use crate::wetting::TexelGeometry;
     use crate::wetting::TexelWater;
@@ -384,13 +385,9 @@ mod tests {
         let now = Now::new(300, 60, &drying, &geometry, None, &material);
         let mut water = SurfaceWater::of_size(32, wrap, geometry.mean_mm2());
         water.wake(false);
-        let mut random = 7u32;
+        let mut random = Random(7);
         for texel in &mut water.texels {
-            let mut next = |below: u32| {
-                random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                (random >> 8) % below
-            };
-            let (film, pores, tick) = (next(900_000), next(400_000), 1 + next(300));
+            let (film, pores, tick) = (random.below(900_000), random.below(400_000), 1 + random.below(300));
             *texel = TexelWater { film, pores, tick, ..Default::default() };
         }
         let mut films = Films::new(&water, &now);

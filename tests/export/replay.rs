@@ -83,8 +83,7 @@ fn a_scenario_at_its_end_is_a_scene_with_or_without_a_renderer() {
         assert_eq!(fs::read(plain.join(&map)).unwrap(), fs::read(out.join(&map)).unwrap(), "{map}");
     }
 
-    if std::env::var("WEATHERING_SKIP_GPU").is_ok_and(|value| value == "1") {
-        eprintln!("skipped: needs a GPU, and WEATHERING_SKIP_GPU=1");
+    if crate::common::skips_gpu() {
         return;
     }
     // What was painted on the GPU and drawn is the same scene, to the byte.

@@ -24,8 +24,7 @@ pub struct Gpu {
 /// If there is no adapter or it refuses a device: a run that tested nothing must not pass for a success.
 pub fn gpu() -> Option<Gpu> {
     static GPU: OnceLock<Gpu> = OnceLock::new();
-    if std::env::var("WEATHERING_SKIP_GPU").is_ok_and(|value| value == "1") {
-        eprintln!("skipped: needs a GPU, and WEATHERING_SKIP_GPU=1");
+    if crate::common::skips_gpu() {
         return None;
     }
     Some(GPU.get_or_init(open_gpu).clone())

@@ -13,15 +13,14 @@ use bevy_weathering::overload::OverloadDiagnosticsPlugin;
 use bevy_weathering::stamps::StampKind;
 
 use super::app::{app, read_back, update, update_until};
+use crate::common::Random;
 
 pub(super) const SIZE: u32 = 128;
 
 /// Splats all over the map, many across its edges, of all sizes up to the map's.
-pub(super) fn random_splats(count: u32, mut seed: u64) -> Vec<Splat> {
-    let mut next = |below: u32| {
-        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((seed >> 33) as u32) % below
-    };
+pub(super) fn random_splats(count: u32, seed: u64) -> Vec<Splat> {
+    let mut random = Random(seed);
+    let mut next = |below: u32| random.below(below as usize) as u32;
     (0..count)
         .map(|number| {
             let end = SIZE * 256;
@@ -128,11 +127,8 @@ fn stamps_that_are_turned_and_stamps_in_space_are_the_same_to_the_bit() {
     let surface = Weatherable { map_size: SIZE, wrap_u: wrap[0], wrap_v: wrap[1], ..default() };
     let triangles = MeshTriangles::from_mesh(&Sphere::new(1.0).mesh().uv(24, 16)).unwrap();
     let frames = SurfaceFrames::new(&triangles, SIZE, wrap);
-    let mut seed = 77u32;
-    let mut next = |below: i32| {
-        seed = seed.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-        ((seed >> 8) % below as u32) as i32
-    };
+    let mut random = Random(77);
+    let mut next = |below: i32| random.below(below as usize) as i32;
     let mut splats = random_splats(400, 5);
     for (number, splat) in splats.iter_mut().enumerate() {
         splat.stamp = [0, 1 + number as u32 % atlas.len(), 4_000_000]

@@ -54,8 +54,7 @@ pub struct Screen {
 impl Screen {
     /// `None` where tests of the renderer are skipped.
     pub fn start() -> Option<Self> {
-        if std::env::var_os("WEATHERING_SKIP_GPU").is_some_and(|skip| skip == "1") {
-            eprintln!("skipped: WEATHERING_SKIP_GPU=1");
+        if crate::common::skips_gpu() {
             return None;
         }
         let memory = tempfile::tempdir().unwrap();

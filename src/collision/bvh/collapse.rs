@@ -212,6 +212,7 @@ mod tests {
     use super::super::wide::{DEEPEST_BELOW, WideRay};
     use super::super::{HEAD_START, Segment, padded};
     use super::*;
+    use crate::test_random::Random;
 
     fn around((low, high): (Vec3, Vec3)) -> Aabb {
         Aabb { min: low.to_array().into(), max: high.to_array().into() }
@@ -219,11 +220,8 @@ mod tests {
 
     /// Boxes here and there, small and large.
     fn scattered(count: usize) -> Vec<Aabb> {
-        let mut state = 11_u64;
-        let mut random = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 40) as f32 / (1_u32 << 24) as f32
-        };
+        let mut random = Random(11);
+        let mut random = || random.unit();
         let some_box = |_| {
             let low = Vec3::new(random(), random(), random()) * 10.0;
             around((low, low + Vec3::new(random(), 0.1 * random(), random() * random())))

@@ -170,8 +170,9 @@ fn triangle(corners: [u32; 3], positions: &[Vec3]) -> Option<(RtTriangle, Aabb)>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::collision::deform::test_bar::{Bar, Random, bent, matrices};
+    use crate::collision::deform::test_bar::{Bar, bent, matrices, segment};
     use crate::collision::{Deformer, MeshBvh, MeshTriangles};
+    use crate::test_random::Random;
 
     fn deformer(mesh: &Mesh) -> Deformer {
         Deformer::from_mesh(mesh, &MeshTriangles::from_mesh(mesh).unwrap()).unwrap()
@@ -203,7 +204,7 @@ mod tests {
         let mut random = Random(7);
         let mut hits = 0;
         for _ in 0..10_000 {
-            let (start, end) = random.segment(&triangles);
+            let (start, end) = segment(&mut random, &triangles);
             let hit = cast(&refitted, start, end);
             hits += u32::from(hit.is_some());
             // Two that share an edge may be hit in the same place.
@@ -267,7 +268,7 @@ mod tests {
         bvh.refit(&spoilt);
         let (mut left, mut gone) = (0, 0);
         let mut random = Random(11);
-        let segments: Vec<_> = (0..3000).map(|_| random.segment(&triangles)).collect();
+        let segments: Vec<_> = (0..3000).map(|_| segment(&mut random, &triangles)).collect();
         for &(start, end) in &segments {
             let (before, after) = (cast(&whole, start, end), cast(&bvh, start, end));
             let Some(before) = before else {

@@ -226,6 +226,7 @@ fn corners_of(aabb: &Aabb) -> (Vec3, Vec3) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_random::Random;
 
     #[test]
     fn flat_meshes_are_hit_at_the_very_start_and_end_of_a_segment_at_any_scale() {
@@ -277,29 +278,15 @@ mod tests {
         }
     }
 
-    /// In [-1, 1).
-    struct Random(u64);
-
-    impl Random {
-        fn signed(&mut self) -> f32 {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 40) as f32 / (1_u32 << 23) as f32 - 1.0
+    /// Triangles of any size up to this one, some of them twice.
+    fn soup(random: &mut Random, count: usize, size: f32) -> Vec<[Vec3; 3]> {
+        let mut soup: Vec<[Vec3; 3]> = Vec::new();
+        while soup.len() < count {
+            let (middle, size) = (random.in_cube(1.0), size * random.signed());
+            let triangle = [0, 1, 2].map(|_| middle + random.in_cube(size));
+            soup.push(if soup.len() % 10 == 9 { soup[soup.len() / 2] } else { triangle });
         }
-
-        fn vector(&mut self) -> Vec3 {
-            Vec3::new(self.signed(), self.signed(), self.signed())
-        }
-
-        /// Triangles of any size up to this one, some of them twice.
-        fn soup(&mut self, count: usize, size: f32) -> Vec<[Vec3; 3]> {
-            let mut soup: Vec<[Vec3; 3]> = Vec::new();
-            while soup.len() < count {
-                let (middle, size) = (self.vector(), size * self.signed());
-                let triangle = [0, 1, 2].map(|_| middle + self.vector() * size);
-                soup.push(if soup.len() % 10 == 9 { soup[soup.len() / 2] } else { triangle });
-            }
-            soup
-        }
+        soup
     }
 
     fn of(positions: Vec<[Vec3; 3]>) -> MeshBvh {
@@ -322,26 +309,30 @@ mod tests {
 
     #[test]
     fn hits_are_those_of_brute_force_to_the_bit() {
-        let mut random = Random(5);
+        let random = &mut Random(5);
         let grid = crate::scenes::meshes::ground(Vec2::splat(2.0), UVec2::splat(16)).unwrap();
         let grid = MeshTriangles::from_mesh(&grid).unwrap().positions;
-        for positions in
-            [random.soup(1, 1.0), random.soup(7, 1.0), random.soup(600, 0.4), random.soup(3000, 0.05), grid]
-        {
+        for positions in [
+            soup(random, 1, 1.0),
+            soup(random, 7, 1.0),
+            soup(random, 600, 0.4),
+            soup(random, 3000, 0.05),
+            grid,
+        ] {
             let bvh = of(positions.clone());
             let mut hits = 0;
             for round in 0..3000 {
                 let corners = positions[round % positions.len()];
                 let (start, end) = match round % 6 {
                     // From anywhere; short; through a corner, an edge, along an axis; within the plane of a triangle.
-                    0 => (random.vector() * 2.0, random.vector() * 2.0),
-                    1 => (corners[0] + random.vector() * 0.1, corners[1] + random.vector() * 0.1),
+                    0 => (random.in_cube(2.0), random.in_cube(2.0)),
+                    1 => (corners[0] + random.in_cube(0.1), corners[1] + random.in_cube(0.1)),
                     2 => {
-                        let start = random.vector() * 2.0;
+                        let start = random.in_cube(2.0);
                         (start, start + (corners[2] - start) * 1.5)
                     }
                     3 => {
-                        let (start, middle) = (random.vector() * 2.0, (corners[0] + corners[1]) * 0.5);
+                        let (start, middle) = (random.in_cube(2.0), (corners[0] + corners[1]) * 0.5);
                         (start, middle * 2.0 - start)
                     }
                     4 => {

@@ -46,17 +46,15 @@ fn aabb((min, max): (Vec3, Vec3)) -> Aabb {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_random::Random;
 
     #[test]
     fn every_overlap_is_found_once() {
-        let mut state = 7u64;
-        let mut random = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 40) as f32 / (1u32 << 24) as f32
-        };
+        let mut random = Random(7);
         let mut some_box = |size: f32| {
-            let low = Vec3::new(random(), random(), random()) * 10.0;
-            (low, low + Vec3::new(random(), random(), random()) * size)
+            let mut place = || Vec3::new(random.unit(), random.unit(), random.unit());
+            let low = place() * 10.0;
+            (low, low + place() * size)
         };
         for count in [0, 1, 2, 300] {
             let boxes: Vec<_> = (0..count).map(|_| some_box(1.0)).collect();

@@ -100,15 +100,12 @@ mod tests {
 
     use super::super::{Segment, intersect};
     use super::*;
+    use crate::test_random::Random;
 
     #[test]
     fn a_pack_says_what_its_triangles_say_one_by_one_to_the_bit() {
-        let mut state = 3_u64;
-        let mut random = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 40) as f32 / (1_u32 << 23) as f32 - 1.0
-        };
-        let mut point = || Vec3::new(random(), random(), random());
+        let mut random = Random(3);
+        let mut point = || random.in_cube(1.0);
         let mut hits = 0;
         for round in 0..20_000 {
             let mut positions: Vec<[Vec3; 3]> =

@@ -84,10 +84,11 @@ mod tests {
     use bevy::tasks::ComputeTaskPool;
 
     use super::*;
-    use crate::collision::deform::test_bar::{Bar, Random, bent, check_hit, inverse_bind_poses};
+    use crate::collision::deform::test_bar::{Bar, bent, check_hit, inverse_bind_poses, segment};
     use crate::collision::deform::{Deformer, PosedMesh, attach_deforming};
     use crate::collision::scene::update_collision_scene;
     use crate::collision::{MeshBvh, MeshTriangles, SceneHit, SurfaceCollider};
+    use crate::test_random::Random;
 
     /// A world whose surfaces are followed when its schedule runs.
     struct Stage {
@@ -166,7 +167,7 @@ mod tests {
         let mut random = Random(1);
         let mut hits = 0;
         for _ in 0..10_000 {
-            let (start, end) = random.segment(&triangles);
+            let (start, end) = segment(&mut random, &triangles);
             let hit = stage.cast(start, end);
             assert!(hit.is_none_or(|hit| hit.surface == surface));
             check_hit(&triangles, hit.as_ref(), start, end);

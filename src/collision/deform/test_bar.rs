@@ -11,6 +11,7 @@ use bevy::mesh::{Indices, PrimitiveTopology, VertexAttributeValues};
 use bevy::prelude::*;
 
 use crate::collision::SceneHit;
+use crate::test_random::Random;
 
 const RINGS: u16 = 24;
 
@@ -106,29 +107,12 @@ pub(in crate::collision) fn matrices(joints: &[Affine3A; 2]) -> [Affine3A; 2] {
     [joints[0] * first, joints[1] * second]
 }
 
-/// Random numbers (Knuth's MMIX).
-pub(in crate::collision) struct Random(pub(in crate::collision) u64);
-
-impl Random {
-    /// 0..1.
-    pub(in crate::collision) fn unit(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f32 / (1 << 24) as f32
-    }
-
-    /// In a cube of twice this size around the origin.
-    pub(in crate::collision) fn in_cube(&mut self, half_size: f32) -> Vec3 {
-        let mut axis = || (2.0 * self.unit() - 1.0) * half_size;
-        Vec3::new(axis(), axis(), axis())
-    }
-
-    /// A segment through all of the neighbourhood of these triangles, or a short one near one of them.
-    pub(in crate::collision) fn segment(&mut self, triangles: &[Triangle]) -> (Vec3, Vec3) {
-        let triangle = &triangles[(self.unit() * triangles.len() as f32) as usize];
-        let middle = (triangle.corners.iter().sum::<DVec3>() / 3.0).as_vec3();
-        let reach = if self.unit() < 0.5 { 1.5 } else { 0.1 };
-        (middle + self.in_cube(reach), middle + self.in_cube(reach))
-    }
+/// A segment through all of the neighbourhood of these triangles, or a short one near one of them.
+pub(in crate::collision) fn segment(random: &mut Random, triangles: &[Triangle]) -> (Vec3, Vec3) {
+    let triangle = &triangles[(random.unit() * triangles.len() as f32) as usize];
+    let middle = (triangle.corners.iter().sum::<DVec3>() / 3.0).as_vec3();
+    let reach = if random.unit() < 0.5 { 1.5 } else { 0.1 };
+    (middle + random.in_cube(reach), middle + random.in_cube(reach))
 }
 
 /// A triangle in world space.

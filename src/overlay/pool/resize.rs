@@ -307,14 +307,13 @@ mod tests {
 
     use super::*;
     use crate::collision::MeshTriangles;
+    use crate::matter::test_world::bump;
     use crate::matter::{Deposit, DepositStamp, MatterKind};
 
     #[test]
     fn matter_that_waits_is_as_large_and_at_the_same_place_on_other_maps_and_its_stamp_too() {
         let stamp = DepositStamp { number: 3, radius: [1024, 768], rows: [[1024, 0], [0, 1024]] };
-        let (center, radius) = ([2048, 4096], [512; 2]);
-        let kind = MatterKind::Dust;
-        let deposit = Deposit { center, radius, kind, volume_nl: 7, stamp: Some(stamp) };
+        let deposit = Deposit { stamp: Some(stamp), ..bump(MatterKind::Dust, 7, [2048, 4096], [512; 2]) };
         let mut deposits = MatterQueue(vec![deposit]);
         resize_queues(64, 32, &mut SplatQueue::default(), None, Some(&mut deposits));
         let stamp = Some(DepositStamp { radius: [512, 384], ..stamp });
