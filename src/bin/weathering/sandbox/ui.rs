@@ -113,8 +113,8 @@ impl Note {
         self.0 = Some((text, true, Instant::now()));
     }
 
-    /// What there is to read.
-    fn shown(&self) -> Option<(&str, bool)> {
+    /// What there is to read, and whether it went wrong.
+    pub fn shown(&self) -> Option<(&str, bool)> {
         let (text, is_wrong, since) = self.0.as_ref()?;
         let seconds = if *is_wrong { 15 } else { 5 };
         (since.elapsed() < Duration::from_secs(seconds)).then_some((text.as_str(), *is_wrong))

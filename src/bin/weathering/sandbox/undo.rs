@@ -283,8 +283,8 @@ mod tests {
 
     /// What was told last, and whether it is a complaint.
     fn told(world: &World) -> (String, bool) {
-        let (text, is_wrong, _) = world.resource::<Note>().0.clone().unwrap();
-        (text, is_wrong)
+        let (text, is_wrong) = world.resource::<Note>().shown().unwrap();
+        (text.to_owned(), is_wrong)
     }
 
     #[test]
@@ -361,9 +361,9 @@ mod tests {
         let mut world = world();
         let mut hit = |control: bool, shift: bool| {
             world.insert_resource(Shortcuts::typed('z', control, shift));
-            world.resource_mut::<Note>().0 = None;
+            world.insert_resource(Note::default());
             world.run_system_cached(press).unwrap();
-            world.resource::<Note>().0.as_ref().map(|(text, ..)| text.clone())
+            world.resource::<Note>().shown().map(|(text, _)| text.to_owned())
         };
         assert_eq!((hit(false, false), hit(false, true)), (None, None));
         assert_eq!(hit(true, false).as_deref(), Some("nothing to take back"));
