@@ -39,7 +39,7 @@ fn every_panel_is_there_at_both_sizes_and_leaves_room_for_the_scene() {
     for zoom in ["1.0", "2.0"] {
         let scenery = Scenery::new(SCENARIO);
         scenery.remember(&format!("(zoom: {zoom}, panel: \"Scenes\")"));
-        let mut sandbox = Sandbox::start_paused(&screen, &scenery);
+        let sandbox = Sandbox::start_paused(&screen, &scenery);
         for name in PANELS {
             let shown = wait_for(name, || {
                 let shown = side(&screen);
