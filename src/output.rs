@@ -1,7 +1,7 @@
 //! Files that are there whole or not at all.
 
 use std::fs;
-use std::io::{Result, Write};
+use std::io::{Error, ErrorKind, Result, Write};
 use std::path::Path;
 
 use tempfile::NamedTempFile;
@@ -16,7 +16,7 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<()> {
     }
     // Removes itself unless it is persisted.
     let mut file = temporary_beside(path)?;
-    file.write_all(bytes)?;
+    file.write_all(bytes).map_err(without_temporary_name)?;
     file.as_file().sync_data()?;
     file.persist(path).map(drop).map_err(|error| error.error)
 }
@@ -49,13 +49,57 @@ pub(crate) fn temporary_beside(path: &Path) -> Result<NamedTempFile> {
         // What a plain file gets, less the umask, and not the owner alone.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    builder
-        .tempfile_in(path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")))
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    builder.tempfile_in(folder).map_err(without_temporary_name)
+}
+
+/// What went wrong, without the path that `tempfile` puts behind it: whoever called names the file that was meant.
+pub(crate) fn without_temporary_name(error: Error) -> Error {
+    let text = error.to_string();
+    match text.split_once(" at path ") {
+        Some((reason, _)) => Error::new(error.kind(), reason),
+        None => error,
+    }
+}
+
+/// Checks that what should be a folder is not a file.
+///
+/// # Errors
+/// It is one.
+pub(crate) fn refuse_file(folder: &Path) -> Result<()> {
+    if folder.is_file() {
+        return Err(Error::new(ErrorKind::NotADirectory, "it is a file, not a folder"));
+    }
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn errors_do_not_name_temporary_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = temporary_beside(&folder.path().join("none/report.json")).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::NotFound);
+        let text = error.to_string();
+        assert!(
+            text.contains("No such file") && !text.contains(TEMPORARY.0) && !text.contains("none"),
+            "{text}"
+        );
+        let plain = Error::other("at path");
+        assert_eq!(without_temporary_name(plain).to_string(), "at path");
+    }
+
+    #[test]
+    fn a_file_is_no_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("out");
+        refuse_file(&file).unwrap();
+        refuse_file(folder.path()).unwrap();
+        fs::write(&file, "mine").unwrap();
+        assert_eq!(refuse_file(&file).unwrap_err().kind(), ErrorKind::NotADirectory);
+    }
 
     #[test]
     fn what_a_killed_run_left_is_removed_and_nothing_else() {

@@ -303,6 +303,44 @@ fn output_that_nobody_can_take_is_an_error_and_no_panic() {
 }
 
 #[test]
+fn a_reader_that_has_had_enough_is_no_error_and_no_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = scene(folder.path());
+    let nobody = || std::io::pipe().unwrap().1;
+    let program = env!("CARGO_BIN_EXE_weathering");
+    let mut schema = Command::new(program);
+    schema.arg("schema");
+    let mut check = Command::new(program);
+    check.arg("check").arg(&file);
+    for mut command in [schema, check, replay(&file, "--no-render --seconds 0.1")] {
+        let outcome = command.stdout(nobody()).output().unwrap();
+        let message = String::from_utf8_lossy(&outcome.stderr);
+        assert_eq!(outcome.status.code(), Some(0), "{message}");
+        assert!(!message.contains("error"), "{message}");
+    }
+    let mut missing = Command::new(program);
+    missing.args(["check", "there is none.ron"]);
+    assert_eq!(missing.stderr(nobody()).output().unwrap().status.code(), Some(2));
+}
+
+#[test]
+fn what_was_mixed_up_is_told_with_what_does_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = scene(folder.path());
+    let taken = folder.path().join("taken");
+    fs::write(&taken, "mine").unwrap();
+    let outcome = run(replay(&file, "--no-render --seconds 0.1 --out").arg(&taken));
+    assert_failed(&outcome, &["taken", "it is a file, not a folder"]);
+    assert_eq!(fs::read_to_string(&taken).unwrap(), "mine");
+    let model = "assets/models/bunny_1000.glb";
+    assert_failed(&run(&mut replay(model, "--no-render")), &[model, "weathering sandbox"]);
+    let mut bake = Command::new(env!("CARGO_BIN_EXE_weathering"));
+    bake.arg("bake").arg(&file).arg("--out").arg(folder.path().join("baked"));
+    assert_failed(&run(&mut bake), &["replay --export"]);
+    assert!(!folder.path().join("baked").exists());
+}
+
+#[test]
 fn a_folder_that_is_read_only_is_told_before_the_run() {
     let folder = tempfile::tempdir().unwrap();
     let file = scene(folder.path());

@@ -17,7 +17,7 @@ use super::texture::Pictures;
 use super::write::Writer;
 use super::{BakedSurface, ExportError, ExportOptions, ExportReport};
 use crate::matter::MatterLook;
-use crate::output::{temporary_beside, write_atomic};
+use crate::output::{refuse_file, temporary_beside, write_atomic};
 use crate::replay::{Progress, SurfaceMaps, write_maps};
 
 /// The most texels of all maps together: 128 maps of 512 x 512. Each takes some 200 bytes while it is baked.
@@ -148,7 +148,7 @@ impl Export {
     pub fn check_folder(folder: &Path) -> Result<(), ExportError> {
         // The nearest that there is, which has to be a folder.
         let there = folder.ancestors().find(|path| path.exists()).unwrap_or(Path::new("."));
-        let writable = temporary_beside(&there.join("report.json"));
+        let writable = refuse_file(there).and_then(|()| temporary_beside(&there.join("report.json")));
         writable.map(drop).map_err(|source| ExportError::Write { path: folder.into(), source })
     }
 

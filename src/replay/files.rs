@@ -9,7 +9,7 @@ use super::plots::{PLOT_FILES, PLOTS_FOLDER};
 use super::series::{SERIES_FILE, TIMINGS_FILE};
 use super::sheet::SHEET_FILE;
 use super::video::{ANIMATION_FILE, VIDEO_FILE};
-use crate::output::{self, remove_temporaries, temporary_beside};
+use crate::output::{self, refuse_file, remove_temporaries, temporary_beside};
 
 /// Writes under a temporary name beside `path` and renames; makes missing folders. On an error nothing is left.
 ///
@@ -24,7 +24,9 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), ReplayError> {
 /// # Errors
 /// [`ReplayError::Write`] with the folder.
 pub(super) fn require_writable(folder: &Path) -> Result<(), ReplayError> {
-    let writable = fs::create_dir_all(folder).and_then(|()| temporary_beside(&folder.join("report.json")));
+    let writable = refuse_file(folder)
+        .and_then(|()| fs::create_dir_all(folder))
+        .and_then(|()| temporary_beside(&folder.join("report.json")));
     writable.map(drop).map_err(|source| ReplayError::Write { path: folder.into(), source })
 }
 

@@ -10,6 +10,7 @@ use std::{fs, io};
 use tempfile::TempDir;
 
 use super::maps::STATE;
+use crate::output::without_temporary_name;
 
 /// The hidden folder's part that becomes the scene.
 pub(super) const NEW: &str = "new";
@@ -30,7 +31,7 @@ fn parent(place: &Path) -> &Path {
 /// A folder beside the place that removes itself with all that is in it, unless it is kept.
 pub(super) fn folder_beside(place: &Path) -> io::Result<TempDir> {
     let prefix = prefix(place).ok_or_else(|| io::Error::other("it has no name"))?;
-    tempfile::Builder::new().prefix(&prefix).tempdir_in(parent(place))
+    tempfile::Builder::new().prefix(&prefix).tempdir_in(parent(place)).map_err(without_temporary_name)
 }
 
 /// Hidden folders of the place, in the order of their names.

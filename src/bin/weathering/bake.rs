@@ -3,15 +3,14 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use bevy::log::tracing_subscriber;
 use bevy::math::Vec3;
 use bevy_weathering::export::{Export, ExportOptions, bake};
 use bevy_weathering::weather::Weather;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::print;
 use crate::wetmap::numbers;
+use crate::{log_warnings, print};
 
 #[derive(Args, Debug)]
 pub struct BakeArgs {
@@ -22,41 +21,42 @@ pub struct BakeArgs {
     pub out: PathBuf,
     /// Water on level ground, mm/h, 0.1 to 300
     #[arg(long, value_name = "MM_PER_H", default_value_t = ExportOptions::default().rain_mm_per_h)]
+    #[arg(allow_negative_numbers = true)]
     pub rain: f32,
     /// Wind, m/s [default: none]
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true)]
     pub wind: Option<[f32; 3]>,
-    /// How long it rains, up to a day
-    #[arg(long, default_value_t = ExportOptions::default().minutes)]
+    /// How long it rains, minutes, up to a day
+    #[arg(long, default_value_t = ExportOptions::default().minutes, allow_negative_numbers = true)]
     pub minutes: f32,
     /// °C, -40 to 60
     #[arg(long, default_value_t = Weather::default().temperature_c, allow_hyphen_values = true)]
     pub temperature: f32,
     /// Relative humidity, 0 to 1
-    #[arg(long, default_value_t = Weather::default().humidity)]
+    #[arg(long, default_value_t = Weather::default().humidity, allow_negative_numbers = true)]
     pub humidity: f32,
     /// Texels along each side of a surface's maps, a multiple of 16 up to 2048
-    #[arg(long, default_value_t = ExportOptions::default().map_size)]
+    #[arg(long, default_value_t = ExportOptions::default().map_size, allow_negative_numbers = true)]
     pub size: u32,
     /// Texels along each side of the textures [default: as the scene's own, up to 2048]
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     pub texture_size: Option<u32>,
     /// Ticks a second: films run at most one texel a tick
-    #[arg(long, default_value_t = ExportOptions::default().tick_hz)]
+    #[arg(long, default_value_t = ExportOptions::default().tick_hz, allow_negative_numbers = true)]
     pub hz: u32,
     /// Particles a second above the scene, each for many drops
-    #[arg(long, default_value_t = ExportOptions::default().particles_per_second)]
+    #[arg(long, default_value_t = ExportOptions::default().particles_per_second, allow_negative_numbers = true)]
     pub particles: f32,
-    /// Another one, other drops
-    #[arg(long, default_value_t = ExportOptions::default().seed)]
+    /// Seed: another one, other drops
+    #[arg(long, default_value_t = ExportOptions::default().seed, allow_negative_numbers = true)]
     pub seed: u64,
     /// Threads to compute ticks with [default: all cores]
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     pub threads: Option<usize>,
 }
 
 pub fn run(arguments: &BakeArgs) -> Result<(), Box<dyn Error>> {
-    tracing_subscriber::fmt().with_max_level(bevy::log::Level::WARN).with_writer(std::io::stderr).init();
+    log_warnings();
     let weather = Weather {
         wind: arguments.wind.map_or(Vec3::ZERO, Vec3::from_array),
         temperature_c: arguments.temperature,
@@ -75,6 +75,13 @@ pub fn run(arguments: &BakeArgs) -> Result<(), Box<dyn Error>> {
         threads: arguments.threads,
         ..ExportOptions::default()
     };
+    if arguments.scene.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("ron")) {
+        let scene = arguments.scene.display();
+        return Err(format!(
+            "{scene}: not a glTF; of a scenario, `weathering replay --export DIR` writes the same"
+        )
+        .into());
+    }
     options.check()?;
     Export::check_folder(&arguments.out)?;
     let bar = ProgressBar::no_length().with_style(

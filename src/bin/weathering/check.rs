@@ -7,8 +7,8 @@ use std::process::ExitCode;
 
 use bevy_weathering::scenario::{LoadedScenario, Scenario, ScenarioError, schema_json};
 
-use crate::cli::CheckArgs;
-use crate::print;
+use crate::cli::{CheckArgs, refuse_model};
+use crate::{print, tell};
 
 /// Checks all files; exit code 2 if one of them cannot be run.
 pub fn run(arguments: &CheckArgs) -> Result<ExitCode, Box<dyn Error>> {
@@ -17,7 +17,7 @@ pub fn run(arguments: &CheckArgs) -> Result<ExitCode, Box<dyn Error>> {
         match check(file, arguments.variant.as_deref()) {
             Ok(summaries) => summaries.iter().try_for_each(print)?,
             Err(error) => {
-                eprintln!("error: {error}");
+                tell(format_args!("error: {error}"));
                 code = ExitCode::from(2);
             }
         }
@@ -32,7 +32,8 @@ pub fn print_schema() -> Result<ExitCode, Box<dyn Error>> {
 }
 
 /// A summary of the file with a variant or, without one, of the file alone and with each of them.
-fn check(file: &Path, variant: Option<&str>) -> Result<Vec<String>, ScenarioError> {
+fn check(file: &Path, variant: Option<&str>) -> Result<Vec<String>, Box<dyn Error>> {
+    refuse_model(file)?;
     let loaded = Scenario::load_variant(file, variant)?;
     let mut summaries = vec![summary(&loaded)?];
     if variant.is_none() {

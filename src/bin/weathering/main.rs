@@ -12,9 +12,10 @@ mod wetmap;
 
 use std::error::Error;
 use std::fmt::Display;
-use std::io::Write;
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::process::ExitCode;
 
+use bevy::log::tracing_subscriber;
 use clap::Parser;
 
 /// What has done all it should.
@@ -22,11 +23,31 @@ fn done(result: Result<(), Box<dyn Error>>) -> Result<ExitCode, Box<dyn Error>> 
     result.map(|()| ExitCode::SUCCESS)
 }
 
-/// Writes a line to standard output, which may be a full disk or a pipe that nobody reads any more.
+/// Writes a line to standard output, which may be a full disk. That whoever reads it has had enough, as `head` has, is no
+/// error.
 fn print(line: impl Display) -> Result<(), Box<dyn Error>> {
     let mut out = std::io::stdout().lock();
-    let written = writeln!(out, "{line}").and_then(|()| out.flush());
-    written.map_err(|error| format!("cannot write to standard output: {error}").into())
+    match writeln!(out, "{line}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(format!("cannot write to standard output: {error}").into())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Writes a line to standard error. Where nobody can read it, there is no one to tell either; `eprintln!` would panic.
+fn tell(line: impl Display) {
+    let _ = writeln!(std::io::stderr().lock(), "{line}");
+}
+
+/// Warnings go to standard error, in colour only where a terminal shows it and `NO_COLOR` is not set.
+fn log_warnings() {
+    let is_set = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+    tracing_subscriber::fmt()
+        .with_max_level(bevy::log::Level::WARN)
+        .with_ansi(std::io::stderr().is_terminal() && !is_set)
+        .with_writer(std::io::stderr)
+        .init();
 }
 
 fn main() -> ExitCode {
@@ -43,7 +64,7 @@ fn main() -> ExitCode {
     match result {
         Ok(code) => code,
         Err(error) => {
-            eprintln!("error: {error}");
+            tell(format_args!("error: {error}"));
             ExitCode::from(2)
         }
     }

@@ -4,18 +4,17 @@ use std::error::Error;
 use std::path::Path;
 use std::process::ExitCode;
 
-use bevy::log::tracing_subscriber;
 use bevy_weathering::replay::{ReplayOptions, replay};
 use bevy_weathering::scenario::{Expectation, ExpectationOutcome, Scenario};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::batch;
-use crate::cli::ReplayArgs;
-use crate::print;
+use crate::cli::{ReplayArgs, refuse_model};
+use crate::{log_warnings, print, tell};
 
 /// Exit code 1 if something was not as the scenario expects it.
 pub fn run(arguments: &ReplayArgs) -> Result<ExitCode, Box<dyn Error>> {
-    tracing_subscriber::fmt().with_max_level(bevy::log::Level::WARN).with_writer(std::io::stderr).init();
+    log_warnings();
     match arguments.files.as_slice() {
         [file] if !arguments.is_batch() => run_one(file, arguments),
         _ => batch::run(arguments),
@@ -26,6 +25,7 @@ fn run_one(file: &Path, arguments: &ReplayArgs) -> Result<ExitCode, Box<dyn Erro
     if arguments.end_with_input {
         batch::end_with_input();
     }
+    refuse_model(file)?;
     let options = ReplayOptions {
         out: arguments.out.clone(),
         fps: arguments.fps,
@@ -43,7 +43,7 @@ fn run_one(file: &Path, arguments: &ReplayArgs) -> Result<ExitCode, Box<dyn Erro
         ..ReplayOptions::new(Scenario::load_variant(file, arguments.variant.as_deref())?)
     };
     for flaw in &options.scenario.scenario.flaws {
-        eprintln!("warning: the recorded session comes out differently: {flaw}");
+        tell(format_args!("warning: the recorded session comes out differently: {flaw}"));
     }
     let bar = ProgressBar::no_length().with_style(
         ProgressStyle::with_template("{bar:40} tick {pos}/{len}, {elapsed} gone, {eta} to go")
@@ -64,7 +64,7 @@ fn run_one(file: &Path, arguments: &ReplayArgs) -> Result<ExitCode, Box<dyn Erro
         None => print(serde_json::to_string_pretty(&report)?)?,
     }
     for outcome in report.failed() {
-        eprintln!("not as expected: {}", describe(outcome));
+        tell(format_args!("not as expected: {}", describe(outcome)));
     }
     Ok(if report.failed().next().is_none() { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }

@@ -15,13 +15,13 @@ pub struct StampsArgs {
     #[arg(long, value_enum)]
     pub kind: Vec<StampKind>,
     /// Texels along each side of a stamp: 16, 32, 64, 128 or 256
-    #[arg(long, default_value_t = StampOptions::default().size)]
+    #[arg(long, default_value_t = StampOptions::default().size, allow_negative_numbers = true)]
     pub size: u32,
     /// Stamps of each kind, side by side, 1 to 16
-    #[arg(long, default_value_t = StampOptions::default().variants)]
+    #[arg(long, default_value_t = StampOptions::default().variants, allow_negative_numbers = true)]
     pub variants: u32,
     /// Another one, other stamps
-    #[arg(long, default_value_t = StampOptions::default().seed)]
+    #[arg(long, default_value_t = StampOptions::default().seed, allow_negative_numbers = true)]
     pub seed: u64,
 }
 

@@ -40,16 +40,16 @@ pub struct FromPhotoArgs {
     #[arg(long)]
     pub out: PathBuf,
     /// How far a spot falls from its middle to its rim, 0 to 1
-    #[arg(long, default_value_t = PhotoOptions::default().gradient)]
+    #[arg(long, default_value_t = PhotoOptions::default().gradient, allow_negative_numbers = true)]
     pub gradient: f32,
     /// Spots of fewer pixels are noise
-    #[arg(long, default_value_t = PhotoOptions::default().min_area)]
+    #[arg(long, default_value_t = PhotoOptions::default().min_area, allow_negative_numbers = true)]
     pub min_area: u32,
     /// Holes of up to this many pixels are filled
-    #[arg(long, default_value_t = PhotoOptions::default().max_hole)]
+    #[arg(long, default_value_t = PhotoOptions::default().max_hole, allow_negative_numbers = true)]
     pub max_hole: u32,
     /// Wet over dry, linear, below which a pixel is wet [default: found by itself]
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     pub threshold: Option<f32>,
 }
 
@@ -59,19 +59,19 @@ pub struct PerlinArgs {
     #[arg(long)]
     pub out: PathBuf,
     /// Texels along each side
-    #[arg(long, default_value_t = PerlinOptions::default().size)]
+    #[arg(long, default_value_t = PerlinOptions::default().size, allow_negative_numbers = true)]
     pub size: u32,
     /// Another one, another map
-    #[arg(long, default_value_t = PerlinOptions::default().seed)]
+    #[arg(long, default_value_t = PerlinOptions::default().seed, allow_negative_numbers = true)]
     pub seed: u64,
     /// Features along each side
-    #[arg(long, default_value_t = PerlinOptions::default().cycles)]
+    #[arg(long, default_value_t = PerlinOptions::default().cycles, allow_negative_numbers = true)]
     pub cycles: f32,
     /// Layers of ever finer features, 1 to 12
-    #[arg(long, default_value_t = PerlinOptions::default().octaves)]
+    #[arg(long, default_value_t = PerlinOptions::default().octaves, allow_negative_numbers = true)]
     pub octaves: u32,
     /// Part of the area that ever gets wet, 0 to 1
-    #[arg(long, default_value_t = PerlinOptions::default().coverage)]
+    #[arg(long, default_value_t = PerlinOptions::default().coverage, allow_negative_numbers = true)]
     pub coverage: f32,
 }
 
@@ -86,19 +86,19 @@ pub struct ExposureArgs {
     #[arg(long)]
     pub surface: Option<String>,
     /// Texels along each side [default: the surface's in a scenario, else 512]
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     pub size: Option<u32>,
     /// Rays per texel
-    #[arg(long, default_value_t = ExposureOptions::default().rays)]
+    #[arg(long, default_value_t = ExposureOptions::default().rays, allow_negative_numbers = true)]
     pub rays: u32,
     /// Wind, m/s [default: the scenario's, else none]
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true)]
     pub wind: Option<[f32; 3]>,
     /// How fast the rain falls in still air, m/s
-    #[arg(long, default_value_t = ExposureOptions::default().fall_speed)]
+    #[arg(long, default_value_t = ExposureOptions::default().fall_speed, allow_negative_numbers = true)]
     pub fall_speed: f32,
     /// Half-angle of the cone of sky that it comes from: 0 is parallel, 90 the whole sky
-    #[arg(long, default_value_t = 8.6, conflicts_with = "plane")]
+    #[arg(long, default_value_t = 8.6, conflicts_with = "plane", allow_negative_numbers = true)]
     pub spread_deg: f32,
     /// A plane that it comes from in place of the sky: middle, and half its size along x and z, m
     #[arg(long, value_name = "CX,CY,CZ,HX,HZ", value_parser = numbers::<5>, allow_hyphen_values = true)]
@@ -114,22 +114,22 @@ pub struct DropsArgs {
     #[arg(long)]
     pub over: Option<PathBuf>,
     /// Texels along each side [default: those of the other map, else 512]
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     pub size: Option<u32>,
     /// Another one, other drops
-    #[arg(long, default_value_t = DropsOptions::default().seed)]
+    #[arg(long, default_value_t = DropsOptions::default().seed, allow_negative_numbers = true)]
     pub seed: u64,
     /// How many
-    #[arg(long, default_value_t = DropsOptions::default().drops)]
+    #[arg(long, default_value_t = DropsOptions::default().drops, allow_negative_numbers = true)]
     pub drops: u32,
     /// Part of them that run down in lines, 0 to 1
-    #[arg(long, default_value_t = DropsOptions::default().lines)]
+    #[arg(long, default_value_t = DropsOptions::default().lines, allow_negative_numbers = true)]
     pub lines: f32,
     /// Least and greatest radius, texels
     #[arg(long, value_name = "MIN,MAX", default_value = "1.5,5", value_parser = numbers::<2>)]
     pub radius: [f32; 2],
     /// The longest line, texels
-    #[arg(long, default_value_t = DropsOptions::default().line_length)]
+    #[arg(long, default_value_t = DropsOptions::default().line_length, allow_negative_numbers = true)]
     pub line_length: f32,
 }
 

@@ -19,7 +19,8 @@ use std::time::Instant;
 use bevy_weathering::scenario::Scenario;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::cli::ReplayArgs;
+use crate::cli::{ReplayArgs, refuse_model};
+use crate::{print, tell};
 use child::Children;
 use done::{Done, Finished, Request};
 
@@ -82,14 +83,14 @@ pub fn run(arguments: &ReplayArgs) -> Result<ExitCode, Box<dyn Error>> {
     };
     let outcomes = batch.run(&jobs, at_a_time);
     batch.bar.finish_and_clear();
-    crate::print(table::table(&jobs, &outcomes).trim_end())?;
+    print(table::table(&jobs, &outcomes).trim_end())?;
     let failed = outcomes.iter().filter(|outcome| matches!(outcome, Outcome::Failed(_))).count();
     if failed > 0 {
         return Err(format!("{failed} of {} scenarios failed", jobs.len()).into());
     }
     let unmet = outcomes.iter().filter(|outcome| outcome.is_unexpected()).count();
     if unmet > 0 {
-        eprintln!("{unmet} of {} scenarios came out not as expected", jobs.len());
+        tell(format_args!("{unmet} of {} scenarios came out not as expected", jobs.len()));
         return Ok(ExitCode::from(1));
     }
     Ok(ExitCode::SUCCESS)
@@ -206,6 +207,7 @@ impl Batch {
 
     fn try_job(&self, job: &Job) -> Result<Outcome, Box<dyn Error>> {
         let begun = Instant::now();
+        refuse_model(&job.file)?;
         let request = Request {
             scenario: job.name.clone(),
             inputs: Scenario::load_variant(&job.file, self.variant.as_deref())?.inputs_hash()?,
@@ -218,7 +220,7 @@ impl Batch {
         Done::remove(&job.folder)?;
         let ran = self.children.run(&job.file, &job.folder, &self.arguments);
         for line in ran.said.lines() {
-            self.bar.suspend(|| eprintln!("{}: {line}", job.name));
+            self.bar.suspend(|| tell(format_args!("{}: {line}", job.name)));
         }
         ran.result?;
         let finished = Done::write(&job.folder, request)?;
