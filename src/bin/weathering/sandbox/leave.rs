@@ -49,6 +49,7 @@ fn press(
     keys: Res<Shortcuts>,
     input: Res<UiInput>,
     unsaved: Res<Unsaved>,
+    saving: Res<Saving>,
     mut help: ResMut<Help>,
     mut note: ResMut<Note>,
     mut leaving: ResMut<Leaving>,
@@ -58,10 +59,11 @@ fn press(
     if !keys.pressed(KeyCode::Escape) || input.popup {
         return;
     }
+    let is_lost = unsaved.0 && !saving.is_saving() && !leaving.0;
     // What is in front goes first.
     if help.0 {
         help.0 = false;
-    } else if unsaved.0 && !leaving.0 && !asked.is_some_and(|asked| asked.elapsed() < PATIENCE) {
+    } else if is_lost && !asked.is_some_and(|asked| asked.elapsed() < PATIENCE) {
         *asked = Some(Instant::now());
         note.complain("Escape once more leaves; what was done is not saved (Ctrl+S)");
     } else {

@@ -197,10 +197,18 @@ mod tests {
         let mut app = app();
         app.world_mut().resource_mut::<leave::Unsaved>().0 = true;
         app.insert_resource(Shortcuts::of(KeyCode::Escape));
+        let is_leaving = |app: &App| app.world().resource::<leave::Leaving>().0;
         app.update();
-        assert_eq!(app.should_exit(), None);
+        assert!(app.should_exit().is_none() && !is_leaving(&app));
         app.update();
         assert_eq!(app.should_exit(), Some(AppExit::Success));
+        // What is being saved is not lost.
+        let mut app = self::app();
+        app.world_mut().resource_mut::<leave::Unsaved>().0 = true;
+        app.insert_resource(settling());
+        app.insert_resource(Shortcuts::of(KeyCode::Escape));
+        app.update();
+        assert!(app.should_exit().is_none() && is_leaving(&app));
     }
 
     #[test]
