@@ -1,11 +1,19 @@
 #!/usr/bin/env bash
-# Renders the pictures of README.md and GALLERY.md anew, into docs/pictures. Arguments: names of scenarios [all].
+# Renders the pictures of README.md and GALLERY.md anew, into docs/pictures. Arguments: names of scenarios, or `sandbox` [all].
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
 build_program
 folder="$(mktemp -d)"
-trap 'rm -rf "${folder}"' EXIT
+screen_pid='' sandbox_pid=''
+finish() {
+    local pid
+    for pid in "${sandbox_pid}" "${screen_pid}"; do
+        [ -z "${pid}" ] || { kill "${pid}" && wait "${pid}"; } 2>/dev/null || true
+    done
+    rm -rf "${folder}"
+}
+trap finish EXIT
 mkdir -p docs/pictures
 
 # picture SCENARIO SIZE (FRAME AS)...: one frame a second of weather; of these, the ones wanted, under their names.
@@ -23,7 +31,36 @@ picture() {
     done
 }
 
+# sandbox SCENARIO AS: the sandbox on a screen of its own, with its panels, while somebody sprays.
+sandbox() {
+    if [ -n "${wanted}" ] && [[ " ${wanted} " != *" sandbox "* ]]; then
+        return
+    fi
+    virtual_screen "${folder}"
+    mkdir -p "${folder}/config/bevy_weathering" "${folder}/sandbox"
+    echo '(panels_in_pictures: true, panel: "Materials", plots: true, charts: (false, true, true, false))' \
+        >"${folder}/config/bevy_weathering/settings.ron"
+    XDG_CONFIG_HOME="${folder}/config" "${CARGO_TARGET_DIR}/release/weathering" sandbox "assets/scenarios/$1.ron" \
+        --out "${folder}/sandbox" >"${folder}/log" 2>&1 &
+    sandbox_pid=$!
+    local window=''
+    until window="$(xdotool search --onlyvisible --name weathering.*running)"; do
+        kill -0 "${sandbox_pid}"
+        sleep 0.5
+    done
+    xdotool windowfocus --sync "${window%%$'\n'*}" mousemove 560 330 mousedown 1
+    for _ in 1 2 3 4 5 6 7 8; do
+        xdotool mousemove_relative 8 4
+        sleep 1
+    done
+    xdotool key F12
+    for _ in $(seq 100); do [ ! -s "${folder}/sandbox/screenshot_000.png" ] || break; sleep 0.2; done
+    xdotool mouseup 1
+    cp "${folder}/sandbox/screenshot_000.png" "docs/pictures/$2.png"
+}
+
 wanted="$*"
+sandbox vase sandbox
 picture hose 1024x576 00006 hose
 picture vase 576x576 00005 vase
 for scenario in bricks flowerpot stone_on_sand porosity_row models cloth; do

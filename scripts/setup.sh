@@ -58,6 +58,23 @@ window_libraries() {
     done
 }
 
+# virtual_screen FOLDER: a white screen of 1280 by 720 as DISPLAY, and the process behind it as screen_pid, to be ended by the caller. The
+# server keeps what is on the screen in FOLDER/Xvfb_screen0.
+virtual_screen() {
+    window_libraries
+    command -v Xvfb >/dev/null || install xvfb
+    command -v xdotool >/dev/null || install xdotool
+    Xvfb -noreset -displayfd 3 -screen 0 1280x720x24 -wr -fbdir "$1" 3>"$1/display" 2>/dev/null &
+    screen_pid=$!
+    for _ in $(seq 100); do [ ! -s "$1/display" ] || break; sleep 0.1; done
+    if [ ! -s "$1/display" ]; then
+        echo "Xvfb does not start" >&2
+        return 1
+    fi
+    DISPLAY=":$(tr -d '[:space:]' <"$1/display")"
+    export DISPLAY
+}
+
 # build_program [OPTION...]: builds `weathering`, and an example with it. What tests and examples depend on switches on features of
 # what Bevy depends on; a build without them would be another Bevy than the one of the tests, and take its time once more.
 build_program() {

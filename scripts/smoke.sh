@@ -6,9 +6,6 @@
 # WEATHERING_PROGRAM: a program that is built already; WEATHERING_START_SECONDS: when the first picture has to be there [5].
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
-window_libraries
-command -v Xvfb >/dev/null || install xvfb
-command -v xdotool >/dev/null || install xdotool
 
 out="${1:-out/smoke}"
 scene="${2:-assets/scenarios/hose.ron}"
@@ -42,13 +39,8 @@ fail() {
     exit 1
 }
 
-# A white screen. The server keeps what is on it in a file: a header of big-endian words, colours, pixels of four bytes.
-Xvfb -noreset -displayfd 3 -screen 0 1280x720x24 -wr -fbdir "${scratch}" 3>"${scratch}/display" 2>/dev/null &
-screen_pid=$!
-for _ in $(seq 100); do [ ! -s "${scratch}/display" ] || break; sleep 0.1; done
-[ -s "${scratch}/display" ] || fail "Xvfb does not start"
-DISPLAY=":$(tr -d '[:space:]' <"${scratch}/display")"
-export DISPLAY
+virtual_screen "${scratch}" || fail "no screen"
+# A header of big-endian words, colours, pixels of four bytes.
 memory="${scratch}/Xvfb_screen0"
 word() { od -An -tu4 --endian=big -j "$((4 * $1))" -N 4 "${memory}" | tr -d '[:space:]'; }
 pixels_at=$(($(word 0) + 12 * $(word 19) + 1))
