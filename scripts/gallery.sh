@@ -31,15 +31,14 @@ picture() {
     done
 }
 
-# sandbox SCENARIO AS: the sandbox on a screen of its own, with its panels, while somebody sprays.
+# sandbox SCENARIO AS: the sandbox on a screen of its own, with its panels, after somebody has sprayed.
 sandbox() {
     if [ -n "${wanted}" ] && [[ " ${wanted} " != *" sandbox "* ]]; then
         return
     fi
     virtual_screen "${folder}"
     mkdir -p "${folder}/config/bevy_weathering" "${folder}/sandbox"
-    echo '(panels_in_pictures: true, panel: "Materials", plots: true, charts: (false, true, true, false))' \
-        >"${folder}/config/bevy_weathering/settings.ron"
+    echo '(panels_in_pictures: true, panel: "Materials")' >"${folder}/config/bevy_weathering/settings.ron"
     XDG_CONFIG_HOME="${folder}/config" "${CARGO_TARGET_DIR}/release/weathering" sandbox "assets/scenarios/$1.ron" \
         --out "${folder}/sandbox" >"${folder}/log" 2>&1 &
     sandbox_pid=$!
@@ -48,14 +47,13 @@ sandbox() {
         kill -0 "${sandbox_pid}"
         sleep 0.5
     done
-    xdotool windowfocus --sync "${window%%$'\n'*}" mousemove 560 330 mousedown 1
+    xdotool windowfocus --sync "${window%%$'\n'*}" mousemove 440 220 mousedown 1
     for _ in 1 2 3 4 5 6 7 8; do
-        xdotool mousemove_relative 8 4
+        xdotool mousemove_relative 10 12
         sleep 1
     done
-    xdotool key F12
+    xdotool mouseup 1 mousemove 800 200 key F12
     for _ in $(seq 100); do [ ! -s "${folder}/sandbox/screenshot_000.png" ] || break; sleep 0.2; done
-    xdotool mouseup 1
     cp "${folder}/sandbox/screenshot_000.png" "docs/pictures/$2.png"
 }
 
