@@ -43,8 +43,8 @@ sandbox() {
         --out "${folder}/sandbox" >"${folder}/log" 2>&1 &
     sandbox_pid=$!
     local window=''
-    until window="$(xdotool search --onlyvisible --name weathering.*running)"; do
-        kill -0 "${sandbox_pid}"
+    until window="$(xdotool search --onlyvisible --name 'weathering.*running')"; do
+        kill -0 "${sandbox_pid}" 2>/dev/null || { cat "${folder}/log" >&2; exit 1; }
         sleep 0.5
     done
     xdotool windowfocus --sync "${window%%$'\n'*}" mousemove 440 220 mousedown 1
@@ -55,6 +55,9 @@ sandbox() {
     xdotool mouseup 1 mousemove 800 200 key F12
     for _ in $(seq 100); do [ ! -s "${folder}/sandbox/screenshot_000.png" ] || break; sleep 0.2; done
     cp "${folder}/sandbox/screenshot_000.png" "docs/pictures/$2.png"
+    kill "${sandbox_pid}" "${screen_pid}"
+    wait "${sandbox_pid}" "${screen_pid}" 2>/dev/null || true
+    sandbox_pid='' screen_pid=''
 }
 
 wanted="$*"

@@ -160,7 +160,7 @@ shot "going on"
 xdotool key r
 xdotool key ctrl+s key Escape
 for _ in $(seq 100); do kill -0 "${sandbox_pid}" 2>/dev/null || break; sleep 0.1; done
-# The first one closes a list that is open.
+# The first one closes a list that is open, or has been asked whether to leave what is not saved.
 if kill -0 "${sandbox_pid}" 2>/dev/null; then
     xdotool key Escape
     for _ in $(seq 300); do kill -0 "${sandbox_pid}" 2>/dev/null || break; sleep 0.1; done

@@ -372,7 +372,7 @@ fn played_at(uv: vec2<f32>) -> f32 {
 fn drop_slopes(uv: vec2<f32>) -> vec2<f32> {
     let size = i32(porous.size);
     let tiles = size / TILE_SIZE;
-    // While nothing has been painted there is room for those of one tile alone.
+    // While nothing has fallen there is room for those of one tile alone.
     if i32(arrayLength(&rings)) < tiles * tiles * RINGS_PER_TILE {
         return vec2<f32>(0.0, 0.0);
     }

@@ -18,6 +18,7 @@ use serde::{Deserialize, Serialize};
 use crate::stamps::StampSet;
 
 pub use drops::DropSizes;
+use drops::{SIZE_CLASSES, fall_speed, settling_speed};
 pub use loader::{EffectError, WeatherEffectLoader};
 pub use shipped::ShippedEffect;
 pub use stamp::{StampSource, StampTurn};
@@ -162,6 +163,16 @@ impl WeatherEffect {
     pub const LEAST_BY_SPEED: f32 = 0.25;
     /// No mark is wider for its speed than by this: of four times `stamp_speed` or more. What is so fast breaks up.
     pub const MOST_BY_SPEED: f32 = 2.0;
+
+    /// How fast its drops or grains fall in still air, m/s, by size class: as it says or, where it says nothing, by their diameters.
+    /// 0 is no drag.
+    pub fn terminal_speeds(&self) -> [f32; SIZE_CLASSES] {
+        self.drops.diameters_mm().map(|mm| match (self.terminal_speed, self.carries) {
+            (Some(given), _) => given,
+            (None, Carries::Dust) => settling_speed(f64::from(mm)) as f32,
+            (None, Carries::Water | Carries::Mud(_) | Carries::Snow) => fall_speed(f64::from(mm)) as f32,
+        })
+    }
 
     /// Whether it leaves colour, gloss or relief.
     pub fn paints(&self) -> bool {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bevy::prelude::*;
 
-use super::drops::{SIZE_CLASSES, fall_speed, settling_speed};
+use super::drops::SIZE_CLASSES;
 use super::{Carries, WeatherEffect};
 use crate::stamps::StampSet;
 
@@ -48,11 +48,7 @@ impl EffectRow {
 
     fn set(&mut self, effect: WeatherEffect) {
         self.diameters_mm = effect.drops.diameters_mm();
-        self.terminal_speeds = self.diameters_mm.map(|mm| match (effect.terminal_speed, effect.carries) {
-            (Some(given), _) => given,
-            (None, Carries::Dust) => settling_speed(f64::from(mm)) as f32,
-            (None, Carries::Water | Carries::Mud(_) | Carries::Snow) => fall_speed(f64::from(mm)) as f32,
-        });
+        self.terminal_speeds = effect.terminal_speeds();
         self.stamp_speed = match effect.carries {
             // Of drops of many sizes: of those in their middle.
             Carries::Water | Carries::Mud(_) => {

@@ -53,6 +53,7 @@ pub use pool::{
 pub(crate) use pool::{
     can_put_size, can_resume_resizing, is_resizing, put_first_size, put_size, resizing_of, resume_resizing,
 };
+pub(crate) use resample::is_reached;
 pub use splat::Splat;
 pub use tiles::{TILE_SIZE, TileBins, TileHeader};
 

@@ -41,7 +41,7 @@ fn doubled(map: &[[u8; 4]], side: u32) -> Vec<[u8; 4]> {
 }
 
 /// Whether one size leads to another by halving or doubling.
-pub(super) fn is_reached(from: u32, to: u32) -> bool {
+pub(crate) fn is_reached(from: u32, to: u32) -> bool {
     let (small, large) = (from.min(to), from.max(to));
     small > 0 && large.is_multiple_of(small) && (large / small).is_power_of_two()
 }

@@ -15,6 +15,7 @@ use crate::clock::WeatheringClock;
 use crate::collision::{MeshBvh, SurfaceCollider};
 use crate::material::PorousMaterial;
 use crate::matter::{SurfaceMatter, bind_dried};
+use crate::overlay::{Unmapped, is_reached};
 use crate::weather::DryingClock;
 
 /// Why a surface cannot be as it was; goes on from its name.
@@ -24,10 +25,13 @@ pub enum NotPutBack {
     /// It was taken away.
     #[error("is no more")]
     Gone,
-    /// It is not measured, or has no maps: others needed the room.
-    #[error("has no maps now, or they are being measured")]
+    /// It is being measured, which passes.
+    #[error("is being measured")]
+    Measured,
+    /// It has no maps: others needed the room.
+    #[error("has no maps now")]
     Unmapped,
-    /// It has another mesh, or its maps have other edges.
+    /// It has another mesh, or its maps have other edges, or a side that is no halving or doubling of what it was.
     #[error("has another shape by now")]
     Reshaped,
 }
@@ -76,16 +80,20 @@ impl KeptSurface {
     /// [`NotPutBack`]; then nothing has happened.
     pub fn put_back(&self, world: &mut World, surface: Entity) -> Result<(), NotPutBack> {
         let Ok(entity) = world.get_entity(surface) else { return Err(NotPutBack::Gone) };
+        if entity.contains::<Unmapped>() {
+            return Err(NotPutBack::Unmapped);
+        }
         let (Some(there), Some(geometry), Some(collider)) =
             (entity.get::<SurfaceWater>(), entity.get::<WetGeometry>(), entity.get::<SurfaceCollider>())
         else {
-            return Err(NotPutBack::Unmapped);
+            return Err(NotPutBack::Measured);
         };
-        if !Arc::ptr_eq(&collider.0, &self.bvh) || there.wrap != self.water.wrap {
+        let is_like = there.wrap == self.water.wrap && is_reached(self.water.size, there.size);
+        if !is_like || !Arc::ptr_eq(&collider.0, &self.bvh) {
             return Err(NotPutBack::Reshaped);
         }
         if [geometry.0.size(), self.geometry.size()] != [there.size, self.water.size] {
-            return Err(NotPutBack::Unmapped);
+            return Err(NotPutBack::Measured);
         }
         let (water, matter) = if there.size == self.water.size {
             (self.water.clone(), self.matter.clone())
@@ -95,7 +103,7 @@ impl KeptSurface {
         };
         let mut contents = world.query::<(&mut SurfaceWater, &mut SurfaceMatter)>();
         let Ok((mut there, mut beside)) = contents.get_mut(world, surface) else {
-            return Err(NotPutBack::Unmapped);
+            return Err(NotPutBack::Measured);
         };
         there.become_again(&mut beside, water, matter);
         Ok(())
@@ -176,7 +184,9 @@ mod tests {
 
     use super::*;
     use crate::collision::MeshTriangles;
+    use crate::matter::MatterKind;
     use crate::overlay::Wrap;
+    use crate::weather::Weather;
 
     const WRAP: [Wrap; 2] = [Wrap::Clamp; 2];
 
@@ -328,6 +338,38 @@ mod tests {
     }
 
     #[test]
+    fn what_dries_meanwhile_is_dry_on_maps_of_another_size_and_its_dust_is_there() {
+        let mut plate = Plate::new(64);
+        let mut drying = DryingClock::default();
+        drying.change(&Weather { drying_speed: 30.0, ..default() }, 0, 60);
+        plate.world.insert_resource(drying);
+        plate.world.insert_resource(WeatheringClock::new(60));
+        plate.cover(0.1, 0.02, 0);
+        let matter = |plate: &mut Plate, edit: &dyn Fn(&mut SurfaceMatter)| {
+            let mut matter = plate.world.get_mut::<SurfaceMatter>(plate.surface).unwrap();
+            edit(&mut matter);
+            let stock = matter.stock();
+            stock.dust + stock.mud
+        };
+        let soil = matter(&mut plate, &|matter| {
+            matter.wake(64);
+            (0..64 * 64).for_each(|texel| matter.receive(texel, MatterKind::Dust, 1000));
+        });
+        let (kept, held) = (plate.kept(), plate.held());
+        plate.world.resource_mut::<WeatheringClock>().go_to(600);
+        plate.resize(32);
+        matter(&mut plate, &|matter| {
+            matter.wake(32);
+            matter.receive(5, MatterKind::Mud, 7);
+        });
+        assert_eq!(plate.put_back(&kept), Ok(()));
+        let (ledger, left) = (plate.water().ledger(), plate.held());
+        assert!(ledger.evaporated > 0 && left[0] < held[0], "{ledger:?}");
+        assert_eq!(left[0] + left[1] + ledger.evaporated, ledger.received);
+        assert_eq!(matter(&mut plate, &|_| {}), soil);
+    }
+
+    #[test]
     fn what_cannot_come_back_says_why_and_nothing_happens() {
         let mut plate = Plate::new(32);
         let dry = plate.kept();
@@ -340,9 +382,16 @@ mod tests {
         assert_eq!(plate.held(), held);
         plate.world.entity_mut(plate.surface).insert(SurfaceCollider(plate.bvh.clone()));
         let water = plate.world.entity_mut(plate.surface).take::<SurfaceWater>().unwrap();
+        assert_eq!(plate.put_back(&dry), Err(NotPutBack::Measured));
+        plate.world.entity_mut(plate.surface).insert(Unmapped::Evicted);
         assert_eq!(plate.put_back(&dry), Err(NotPutBack::Unmapped));
-        plate.world.entity_mut(plate.surface).insert(water);
+        plate.world.entity_mut(plate.surface).remove::<Unmapped>().insert(water);
         assert_eq!(plate.put_back(&dry), Ok(()));
+        // No halving or doubling leads from these maps to those.
+        let geometry = plate.geometry(48);
+        let water = SurfaceWater::of_size(48, WRAP, geometry.mean_mm2());
+        plate.world.entity_mut(plate.surface).insert((water, WetGeometry(Arc::new(geometry))));
+        assert_eq!(plate.put_back(&dry), Err(NotPutBack::Reshaped));
         plate.world.despawn(plate.surface);
         assert_eq!(plate.put_back(&dry), Err(NotPutBack::Gone));
     }

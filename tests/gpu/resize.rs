@@ -15,7 +15,7 @@ use super::splat::{SIZE, maps_of, painted, push, random_splats};
 
 /// Enough for whatever may fall on a map of half the side, and for nothing on a whole one.
 fn half_a_budget() -> MapBudget {
-    let need = MapNeed { colors: true, water: true, matter: true, frames: true };
+    let need = MapNeed { colors: true, rings: true, water: true, matter: true, frames: true };
     MapBudget { bytes: need.bytes(SIZE / 2), texel: None }
 }
 

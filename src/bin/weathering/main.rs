@@ -47,6 +47,8 @@ fn log_warnings() {
         .with_max_level(bevy::log::Level::WARN)
         .with_ansi(std::io::stderr().is_terminal() && !is_set)
         .with_writer(std::io::stderr)
+        // It would be told with `eprintln!`, which panics where nobody reads.
+        .log_internal_errors(false)
         .init();
 }
 

@@ -126,7 +126,7 @@ pub struct DropsArgs {
     #[arg(long, default_value_t = DropsOptions::default().lines, allow_negative_numbers = true)]
     pub lines: f32,
     /// Least and greatest radius, texels
-    #[arg(long, value_name = "MIN,MAX", default_value = "1.5,5", value_parser = numbers::<2>)]
+    #[arg(long, value_name = "MIN,MAX", default_value = "1.5,5", allow_hyphen_values = true, value_parser = numbers::<2>)]
     pub radius: [f32; 2],
     /// The longest line, texels
     #[arg(long, default_value_t = DropsOptions::default().line_length, allow_negative_numbers = true)]

@@ -112,6 +112,26 @@ impl Overlays {
     }
 }
 
+/// [`Overlays`] by name, so that nothing here keeps the maps of a surface that has gone or got others.
+#[derive(Clone, Copy)]
+pub(super) struct Maps {
+    pub(super) size: u32,
+    pub(super) wrap: [Wrap; 2],
+    pub(super) images: [AssetId<Image>; 3],
+    pub(super) rings: AssetId<ShaderBuffer>,
+}
+
+impl From<&Overlays> for Maps {
+    fn from(overlays: &Overlays) -> Self {
+        Self {
+            size: overlays.size,
+            wrap: overlays.wrap,
+            images: [overlays.diffuse.id(), overlays.specular.id(), overlays.normal.id()],
+            rings: overlays.rings.id(),
+        }
+    }
+}
+
 /// Bytes of the rings of maps with so many texels along each side.
 fn ring_bytes(size: u32) -> usize {
     ((size / TILE_SIZE).pow(2) * RainRing::PER_TILE) as usize * size_of::<RainRing>()
@@ -191,7 +211,7 @@ pub(super) fn open_overlays(
     mut surfaces: Query<(&mut Overlays, &SplatQueue)>,
 ) {
     for (mut overlays, queue) in &mut surfaces {
-        if queue.is_empty() || overlays.is_open_for(queue) {
+        if queue.is_empty() {
             continue;
         }
         if !overlays.has_rings {

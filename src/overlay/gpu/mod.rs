@@ -1,11 +1,12 @@
 //! Painting splats on the GPU: one compute pass before the cameras draw.
 //!
-//! Main world: every surface gets textures and buffers ([`Overlays`]), of full size once something is to be painted. Extract
-//! moves the waiting splats over (each exactly once, however many ticks the frame held). Prepare sorts them into tiles and
-//! uploads them; until the pipeline and the maps exist, they wait, and so does what is beyond the frame's [`SplatBudget`]. If the
-//! pipeline can never exist, they are counted as [lost](SplatStats::lost) and time goes on. The pass dispatches one workgroup per
-//! touched tile: a surface without new splats costs nothing, which [`SplatStats`] shows. Then the touched tiles are halved into
-//! the mip maps of the colour maps (`mips.rs`). Maps of another size get what was painted on the old ones (`copies.rs`).
+//! Main world: every surface gets textures and buffers ([`Overlays`]), of full size once there is something to put there: rings
+//! with the first splat, colour maps with the first that paints. Extract moves the waiting splats over (each exactly once, however
+//! many ticks the frame held). Prepare sorts them into tiles and uploads them; until the pipeline and the maps exist, they wait,
+//! and so does what is beyond the frame's [`SplatBudget`]. If the pipeline can never exist, they are counted as
+//! [lost](SplatStats::lost) and time goes on. The pass dispatches one workgroup per touched tile, if anything in the batch paints,
+//! and remembers drops: a surface without new splats costs nothing, which [`SplatStats`] shows. Then the touched tiles are halved
+//! into the mip maps of the colour maps (`mips.rs`). Maps of another size get what was painted on the old ones (`copies.rs`).
 
 mod backlog;
 mod copies;

@@ -10,19 +10,20 @@ use bevy::render::render_resource::{
     DynamicUniformBuffer, PipelineCache, RawBufferVec, ShaderType, SpecializedComputePipelines, TextureView,
 };
 use bevy::render::renderer::{RenderDevice, RenderQueue};
-use bevy::render::storage::{GpuShaderBuffer, ShaderBuffer};
+use bevy::render::storage::GpuShaderBuffer;
 use bevy::render::texture::GpuImage;
 use bevy::render::{Extract, MainWorld};
 
 use super::SplatStats;
 use super::backlog::Backlog;
 use super::copies::{MapCopies, PendingCopies};
-use super::maps::Overlays;
+use super::maps::{Maps, Overlays};
 use super::mips::{MipBatches, MipPipeline, SurfaceLevels};
 use super::pass::{SplatKinds, SplatPipeline, has_failed};
 use super::texels::{TexelRows, stamp_texture};
 use crate::overlay::{
     Lying, Splat, SplatBudget, SplatQueue, StampAtlas, SurfaceFrames, TexelFrame, TileBins, TileHeader, Wrap,
+    is_reached,
 };
 
 /// What the pass needs to know about one surface. `SurfaceBatch` in `shaders/splat.wgsl` has the same fields.
@@ -72,23 +73,12 @@ struct PendingSurface {
     backlog: Backlog,
 }
 
-/// [`Overlays`] by name, so that nothing here keeps the maps of a surface that has gone or got others.
-#[derive(Clone, Copy)]
-struct Maps {
-    size: u32,
-    wrap: [Wrap; 2],
-    images: [AssetId<Image>; 3],
-    rings: AssetId<ShaderBuffer>,
-}
-
-impl From<&Overlays> for Maps {
-    fn from(overlays: &Overlays) -> Self {
-        Self {
-            size: overlays.size,
-            wrap: overlays.wrap,
-            images: [overlays.diffuse.id(), overlays.specular.id(), overlays.normal.id()],
-            rings: overlays.rings.id(),
-        }
+impl PendingSurface {
+    /// Whether maps of another size are those of the same surface, on which nothing was painted: rings alone are not moved over, but
+    /// what waits is.
+    fn only_clear_water_moves_to(&self, maps: &Maps) -> bool {
+        let is_same = self.maps.wrap == maps.wrap && is_reached(self.maps.size, maps.size);
+        is_same && !self.backlog.waiting().iter().any(Splat::paints)
     }
 }
 
@@ -120,7 +110,8 @@ pub(super) fn extract_splats(
                 // Levels hold on to their textures, also those that a surface has no more.
                 waiting.levels = None;
             }
-            let moves_over = copies.is_some_and(|copies| copies.lead(waiting.maps.images, maps.images));
+            let moves_over = copies.is_some_and(|copies| copies.lead(waiting.maps.images, maps.images))
+                || waiting.only_clear_water_moves_to(&maps);
             if waiting.maps.size != maps.size && moves_over {
                 // What waits is painted over what was there before, by places on the new maps.
                 waiting.backlog.resize(waiting.maps.size, maps.size);

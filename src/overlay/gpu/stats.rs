@@ -30,12 +30,12 @@ impl SplatStats {
     /// timestamps.
     pub const GPU_TIME: DiagnosticPath = DiagnosticPath::const_new("render/paint_splats/elapsed_gpu");
 
-    /// Splats painted.
+    /// Splats that the pass has dealt with: painted or, of clear water, remembered for the rings around them.
     pub fn splats(&self) -> u64 {
         self.0.splats.load(Ordering::Relaxed)
     }
 
-    /// Dispatches: one per surface and frame that paints on it.
+    /// Batches: one per surface and frame in which splats of it are dealt with.
     pub fn dispatches(&self) -> u64 {
         self.0.dispatches.load(Ordering::Relaxed)
     }

@@ -14,7 +14,7 @@ use crate::wetting::{Ledger, Stock, Units};
 #[derive(Component, Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[reflect(Component)]
 pub struct MapLoss {
-    /// Impacts that were never painted.
+    /// Impacts on it while it had no maps, and splats that still waited when it lost them.
     pub unpainted: u64,
     /// Water that had come with particles.
     pub received: u64,

@@ -11,8 +11,10 @@ use crate::wetting::gpu::GpuTexelWater;
 /// Which maps a surface has, or may come to have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MapNeed {
-    /// Three colour maps, and rings of drops.
+    /// Three colour maps.
     pub colors: bool,
+    /// Rings of drops.
+    pub rings: bool,
     /// Water.
     pub water: bool,
     /// Dust, mud and snow.
@@ -31,7 +33,7 @@ impl MapNeed {
             + of(self.water, size_of::<GpuTexelWater>())
             + of(self.matter, size_of::<GpuTexelMatter>())
             + of(self.frames, size_of::<TexelFrame>());
-        let a_tile = of(self.colors, RainRing::PER_TILE as usize * size_of::<RainRing>());
+        let a_tile = of(self.rings, RainRing::PER_TILE as usize * size_of::<RainRing>());
         u64::from(side).pow(2) * a_texel + u64::from(side / TILE_SIZE).pow(2) * a_tile
     }
 }
@@ -130,7 +132,7 @@ pub(super) fn fit(wishes: &[Wish], texel: Option<f32>, room: u64) -> Vec<u32> {
 mod tests {
     use super::*;
 
-    const ALL: MapNeed = MapNeed { colors: true, water: true, matter: true, frames: true };
+    const ALL: MapNeed = MapNeed { colors: true, rings: true, water: true, matter: true, frames: true };
 
     fn wishes(count: u64) -> Vec<Wish> {
         let wish = |order| Wish {

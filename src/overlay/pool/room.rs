@@ -225,7 +225,7 @@ impl Room {
 mod tests {
     use super::*;
 
-    const NEED: MapNeed = MapNeed { colors: true, water: true, matter: false, frames: false };
+    const NEED: MapNeed = MapNeed { colors: true, rings: true, water: true, matter: false, frames: false };
 
     /// Number `order` was hit last at this tick.
     fn mapped(order: u64, last_tick: u32, side: u32) -> Mapped {

@@ -45,7 +45,7 @@ impl Falling {
     /// What a surface may come to hold.
     pub(super) fn need(self, surface: &Weatherable, is_posed: bool) -> MapNeed {
         let frames = self.paint && surface.stamps == StampSpace::Surface && !is_posed;
-        MapNeed { colors: true, water: true, matter: self.solids, frames }
+        MapNeed { colors: true, rings: true, water: true, matter: self.solids, frames }
     }
 }
 

@@ -6,6 +6,7 @@
 
 use bevy::prelude::*;
 use bevy_weathering::effect::WeatherEffect;
+use bevy_weathering::effect::drops::SIZE_CLASSES;
 use bevy_weathering::emitter::Emitter;
 use bevy_weathering::particle::Forces;
 
@@ -37,9 +38,9 @@ impl Flight {
         let Some(effect) = effect else {
             return Self { speed: emitter.speed, gravity: Vec3::ZERO, drag: 0.0 };
         };
-        // At its terminal speed, drag is as strong as gravity.
-        let terminal = effect.terminal_speed.filter(|&speed| speed > 0.0);
-        let drag = terminal.map_or(0.0, |speed| Forces::default().gravity.length() / speed.powi(2));
+        // At their terminal speed, drag is as strong as gravity: of drops in the middle of their sizes.
+        let terminal = effect.terminal_speeds()[SIZE_CLASSES / 2];
+        let drag = if terminal > 0.0 { Forces::default().gravity.length() / terminal.powi(2) } else { 0.0 };
         Self { speed: emitter.speed, gravity: forces.gravity * effect.gravity_scale, drag }
     }
 
@@ -50,15 +51,12 @@ impl Flight {
             return straight;
         }
         let up = -self.gravity.normalize_or_zero();
-        // Half way between level and straight up, nothing goes farther.
-        let level = (*straight - up * straight.dot(up)).normalize_or_zero();
-        let Ok(farthest) = Dir3::new(level + up) else { return straight };
-        let is_too_high = |way: Dir3| way.dot(up) > farthest.dot(up).max(straight.dot(up));
+        // Half way between there and straight up, nothing goes farther.
+        let Ok(farthest) = Dir3::new(*straight + up) else { return straight };
+        let is_too_high = |way: Dir3| way.dot(up) > farthest.dot(up);
         let (mut way, mut aim) = (straight, target);
         for _ in 0..ROUNDS {
-            let Some(passed) = self.passes(from, way, target) else {
-                return if level == Vec3::ZERO { straight } else { farthest };
-            };
+            let Some(passed) = self.passes(from, way, target) else { return farthest };
             aim += target - passed;
             way = match Dir3::new(aim - from) {
                 Ok(way) if !is_too_high(way) => way,
@@ -90,6 +88,8 @@ impl Flight {
 
 #[cfg(test)]
 mod tests {
+    use bevy_weathering::effect::{Carries, DropSizes};
+
     use super::*;
 
     const GRAVITY: f32 = 9.81;
@@ -101,7 +101,9 @@ mod tests {
     #[test]
     fn a_jet_without_drag_follows_a_parabola_to_what_it_is_aimed_at() {
         let from = Vec3::new(0.3, 1.5, -2.0);
-        for (ahead, up) in [(1.0, 0.0), (3.0, -1.0), (5.0, 0.5), (4.0, -1.5)] {
+        for (ahead, up) in
+            [(1.0, 0.0), (3.0, -1.0), (5.0, 0.5), (4.0, -1.5), (1.0, 2.0), (0.3, 3.0), (2.0, 2.5)]
+        {
             let way = flight(10.0, 0.0).aim(from, from + Vec3::new(0.0, up, -ahead));
             let (along, rise) = (-way.z, way.y);
             let seconds = ahead / (along * 10.0);
@@ -139,5 +141,8 @@ mod tests {
         let effect = WeatherEffect { terminal_speed: Some(9.81), ..default() };
         let known = Flight::new(&emitter, Some(&effect), &Forces::default());
         assert!((known.drag - 1.0 / 9.81).abs() < 1e-5 && known.speed == 5.0, "{known:?}");
+        // Of grains by what they are.
+        let dust = WeatherEffect { carries: Carries::Dust, drops: DropSizes::Same(0.05), ..default() };
+        assert!(Flight::new(&emitter, Some(&dust), &Forces::default()).drag > MOST_DRAG);
     }
 }

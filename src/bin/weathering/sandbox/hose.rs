@@ -55,7 +55,7 @@ fn point(
     mut pointed: ResMut<Pointed>,
 ) {
     let window = window.single().ok();
-    pointed.pressed = buttons.just_pressed(MouseButton::Left) && !input.pointer;
+    pointed.pressed = buttons.just_pressed(MouseButton::Left) && !input.took_press;
     // A click within one slow frame is seen pressed and let go of, and counts for that frame.
     pointed.held = pointed.pressed || (pointed.held && buttons.pressed(MouseButton::Left));
     let cursor = window.and_then(Window::cursor_position);
@@ -254,7 +254,7 @@ mod tests {
         schedule.add_systems(point);
         // Of a frame: whether the pointer is over a panel, and what the button does.
         let mut is_held = |over_panel: bool, edit: fn(&mut ButtonInput<MouseButton>)| {
-            world.resource_mut::<UiInput>().pointer = over_panel;
+            world.resource_mut::<UiInput>().took_press = over_panel;
             let mut buttons = world.resource_mut::<ButtonInput<MouseButton>>();
             buttons.clear();
             edit(&mut buttons);

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use bevy::prelude::*;
 use bevy::render::error_handler::{RenderError, RenderErrorHandler, RenderErrorPolicy};
 use bevy::window::WindowCloseRequested;
+use bevy_weathering::record::Recording;
 use bevy_weathering::replay::describe_render_error;
 
 use super::hose::Pointed;
@@ -36,8 +37,15 @@ pub fn plugin(app: &mut App) {
 }
 
 /// Follows whether there is something to lose. That a scene is saved is told by those who do it.
-fn notice(pointed: Res<Pointed>, settings: Res<Settings>, opened: Res<Opened>, mut unsaved: ResMut<Unsaved>) {
-    if pointed.pressed && settings.tool != Tool::Probe {
+fn notice(
+    pointed: Res<Pointed>,
+    settings: Res<Settings>,
+    opened: Res<Opened>,
+    recording: Option<Res<Recording>>,
+    mut unsaved: ResMut<Unsaved>,
+) {
+    // A recording is written anyhow.
+    if pointed.held && recording.is_none() && settings.tool != Tool::Probe {
         unsaved.0 = true;
     }
     if opened.is_changed() {
@@ -59,7 +67,7 @@ fn press(
     if !keys.pressed(KeyCode::Escape) || input.popup {
         return;
     }
-    let is_lost = unsaved.0 && !saving.is_saving() && !leaving.0;
+    let is_lost = unsaved.0 && !saving.will_take() && !leaving.0;
     // What is in front goes first.
     if help.0 {
         help.0 = false;

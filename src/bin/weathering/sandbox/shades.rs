@@ -39,6 +39,8 @@ const DEPTH_BIAS: f32 = 8.0;
 #[derive(Component)]
 pub struct Cover {
     image: Handle<Image>,
+    /// How what lies between two samples is seen. A picture that is shown keeps it.
+    filter: ImageFilterMode,
     /// What was read into it, and when.
     read: Option<(Shade, Instant)>,
 }
@@ -65,6 +67,10 @@ pub fn show(ui: &mut egui::Ui, world: &mut World) {
     if world.resource::<Settings>().views.shade != shade {
         world.resource_mut::<Settings>().views.shade = shade;
     }
+    legend(ui, world, shade);
+}
+
+fn legend(ui: &mut egui::Ui, world: &World, shade: Shade) {
     match shade {
         Shade::Off => {}
         Shade::Wetness | Shade::Saturation => ramp(ui, "0", "100 %"),
@@ -88,12 +94,7 @@ pub fn show_key(context: &egui::Context, free: egui::Rect, world: &World) {
         egui::Frame::popup(ui.style()).show(ui, |ui| {
             ui.set_max_width((free.width() - 40.0).max(120.0));
             ui.label(format!("false colours: {name} (V: next)"));
-            match shade {
-                Shade::Off => {}
-                Shade::Source => sources::legend(ui, world),
-                Shade::Film => ramp(ui, "0", &format!("{MOST_FILM_MM} mm or more")),
-                Shade::Wetness | Shade::Saturation => ramp(ui, "0", "100 %"),
-            }
+            legend(ui, world, shade);
         });
     });
 }
@@ -128,17 +129,19 @@ fn lay(
     mut images: ResMut<Assets<Image>>,
     mut materials: ResMut<Assets<StandardMaterial>>,
     surfaces: Query<Coverable, AtRest>,
-    covers: Query<(Entity, &ChildOf, &Mesh3d), With<Cover>>,
+    covers: Query<(Entity, &Cover, &ChildOf, &Mesh3d)>,
     mut covered: Local<Vec<Entity>>,
 ) {
     let is_on = settings.views.shade != Shade::Off;
+    let wanted = filter(settings.views.shade);
     covered.clear();
-    for (cover, surface, mesh) in &covers {
+    for (entity, cover, surface, mesh) in &covers {
         let surface = surface.parent();
-        if is_on && surfaces.get(surface).is_ok_and(|(_, _, shown, ..)| shown.id() == mesh.id()) {
+        let fits = surfaces.get(surface).is_ok_and(|(_, _, shown, ..)| shown.id() == mesh.id());
+        if is_on && fits && cover.filter == wanted {
             covered.push(surface);
         } else {
-            commands.entity(cover).try_despawn();
+            commands.entity(entity).try_despawn();
         }
     }
     if !is_on {
@@ -149,7 +152,7 @@ fn lay(
         if covered.binary_search(&surface).is_ok() {
             continue;
         }
-        let image = images.add(picture(maps.wrap()));
+        let image = images.add(picture(maps.wrap(), wanted));
         let material = materials.add(StandardMaterial {
             base_color_texture: Some(image.clone()),
             base_color_channel: match uvs {
@@ -163,7 +166,7 @@ fn lay(
             ..default()
         });
         let mut cover = commands.spawn((
-            Cover { image, read: None },
+            Cover { image, filter: wanted, read: None },
             Name::new("cover"),
             Mesh3d(mesh.0.clone()),
             MeshMaterial3d(material),
@@ -178,7 +181,7 @@ fn lay(
 }
 
 /// An empty picture that is repeated as the maps are.
-fn picture(wrap: [Wrap; 2]) -> Image {
+fn picture(wrap: [Wrap; 2], filter: ImageFilterMode) -> Image {
     let size = Extent3d { width: SIDE, height: SIDE, depth_or_array_layers: 1 };
     let format = TextureFormat::Rgba8UnormSrgb;
     let mut image =
@@ -190,6 +193,8 @@ fn picture(wrap: [Wrap; 2]) -> Image {
     image.sampler = ImageSampler::Descriptor(ImageSamplerDescriptor {
         address_mode_u,
         address_mode_v,
+        mag_filter: filter,
+        min_filter: filter,
         ..ImageSamplerDescriptor::linear()
     });
     image
@@ -219,9 +224,6 @@ fn paint(
     let surface = surface.parent();
     let Ok((water, geometry)) = surfaces.get(surface) else { return };
     let Some(mut image) = images.get_mut(&cover.image) else { return };
-    if let ImageSampler::Descriptor(sampler) = &mut image.sampler {
-        [sampler.mag_filter, sampler.min_filter] = [filter(shade); 2];
-    }
     let Some(data) = &mut image.data else { return };
     for (pixel, index) in data.chunks_exact_mut(4).zip(0u32..) {
         let uv = (Vec2::new((index % SIDE) as f32, (index / SIDE) as f32) + 0.5) / SIDE as f32;
@@ -263,12 +265,12 @@ mod tests {
             [Shade::Wetness, Shade::Film, Shade::Saturation].map(|shade| part(shade, &wet)),
             [0.5, 0.5, 0.75]
         );
-        let image = picture([Wrap::Repeat, Wrap::Clamp]);
+        let image = picture([Wrap::Repeat, Wrap::Clamp], filter(Shade::Source));
         assert_eq!(image.data.map(|data| data.len()), Some(4 * (SIDE * SIDE) as usize));
         let ImageSampler::Descriptor(sampler) = image.sampler else { panic!("it has a sampler of its own") };
         assert!(matches!(sampler.address_mode_u, ImageAddressMode::Repeat));
         assert!(matches!(sampler.address_mode_v, ImageAddressMode::ClampToEdge));
-        assert!(matches!(filter(Shade::Source), ImageFilterMode::Nearest));
-        assert!(matches!(filter(Shade::Film), ImageFilterMode::Linear));
+        assert_eq!(sampler.mag_filter, ImageFilterMode::Nearest);
+        assert_eq!(filter(Shade::Film), ImageFilterMode::Linear);
     }
 }

@@ -54,9 +54,12 @@ impl Press {
     };
 }
 
-fn letter_of(key: &Key) -> Option<char> {
-    let Key::Character(text) = key else { return None };
-    text.chars().next().map(|letter| letter.to_ascii_lowercase())
+fn letter_of(key: &KeyboardInput) -> Option<char> {
+    let Key::Character(text) = &key.logical_key else { return None };
+    let typed = text.chars().next().filter(char::is_ascii);
+    // Where letters are not Latin, by its place.
+    let placed = || format!("{:?}", key.key_code).strip_prefix("Key")?.chars().next();
+    typed.or_else(placed).map(|letter| letter.to_ascii_lowercase())
 }
 
 /// Keys that no panel takes.
@@ -130,7 +133,7 @@ impl Shortcuts {
         let ends = matches!(key.logical_key, Key::Enter | Key::Escape | Key::Tab);
         let press = Press {
             code: key.key_code,
-            letter: letter_of(&key.logical_key),
+            letter: letter_of(key),
             control: self.control,
             shift: self.shift,
             asks: asks(key),
@@ -186,7 +189,7 @@ impl Shortcuts {
 }
 
 pub fn plugin(app: &mut App) {
-    // What panels leave is judged in the same way for the mouse.
+    // Whose a press is, is told before tools ask.
     app.init_resource::<Shortcuts>()
         .add_systems(PreUpdate, listen.after(InputSystems).after(ui::judge_pointer));
 }
@@ -209,8 +212,11 @@ pub fn listen(
                 shortcuts.at = Some(moved.position * scale);
             }
             WindowEvent::CursorLeft(_) => shortcuts.at = None,
-            WindowEvent::MouseButtonInput(_) => {
-                let is_taken = shortcuts.at.is_some_and(|at| input.takes(at));
+            WindowEvent::MouseButtonInput(button) => {
+                let is_taken = shortcuts.at.map_or(input.popup, |at| input.takes(at));
+                if button.button == MouseButton::Left && button.state.is_pressed() {
+                    input.took_press = is_taken;
+                }
                 // A press anywhere else ends an edit.
                 if is_taken || owner == Owner::Field {
                     owner = Owner::Unknown;
@@ -384,6 +390,12 @@ mod tests {
         frame(&mut world);
         let shortcuts = world.resource::<Shortcuts>();
         assert!(!shortcuts.with_control('r') && shortcuts.with_control_and_shift('r'));
+        // A letter that is not Latin goes by its place.
+        control(&mut world, ButtonState::Pressed);
+        tap(&mut world, KeyCode::KeyZ, Key::Character("\u{44f}".into()));
+        control(&mut world, ButtonState::Released);
+        frame(&mut world);
+        assert!(world.resource::<Shortcuts>().with_control('z'));
         // In a field it is neither.
         drawn(&mut world, true, false);
         control(&mut world, ButtonState::Pressed);

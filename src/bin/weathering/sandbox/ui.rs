@@ -66,6 +66,10 @@ pub struct UiInput {
     pub drags: bool,
     /// What panels leave of the window, physical pixels, if that is known.
     pub free: Option<Rect>,
+    /// How far into that the edges of panels are grabbed, physical pixels.
+    pub grab: f32,
+    /// The left button was last pressed where panels take it.
+    pub took_press: bool,
     /// What lies in front of that, physical pixels: windows, and the line between two scenes.
     pub fronts: Vec<Rect>,
     /// A text is being edited.
@@ -81,7 +85,7 @@ impl UiInput {
     pub fn takes(&self, at: Vec2) -> bool {
         // A list is closed by a click anywhere.
         self.popup
-            || self.free.is_some_and(|free| !free.contains(at))
+            || self.free.is_some_and(|free| !free.inflate(-self.grab).contains(at))
             || self.fronts.iter().any(|front| front.contains(at))
     }
 }
@@ -243,7 +247,9 @@ fn draw(world: &mut World, mut is_dressed: Local<bool>) {
     }
     let corner = |at: egui::Pos2| Vec2::new(at.x, at.y) * context.pixels_per_point();
     let physical = |rect: egui::Rect| Rect::from_corners(corner(rect.min), corner(rect.max));
+    let grab = context.global_style().interaction.resize_grab_radius_side * context.pixels_per_point();
     let mut input = world.resource_mut::<UiInput>();
+    input.grab = grab;
     input.free = Some(physical(free));
     input.fronts.clear();
     input.fronts.extend(fronts(&context).map(physical));

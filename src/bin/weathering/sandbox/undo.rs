@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 use bevy::prelude::*;
 use bevy_weathering::brush::BrushQueue;
 use bevy_weathering::record::Recording;
-use bevy_weathering::wetting::KeptSurface;
+use bevy_weathering::wetting::{KeptSurface, NotPutBack};
 
 use super::added::Done;
 use super::shortcuts::Shortcuts;
@@ -82,6 +82,15 @@ impl Step {
         match self {
             Self::Stroke(stroke) => stroke.iter().map(|before| before.kept.bytes()).sum(),
             Self::Emitter(_) => EMITTER,
+        }
+    }
+}
+
+impl Stack<Step> {
+    /// Adds one, if there is one.
+    fn keep(&mut self, step: Option<Step>) {
+        if let Some(step) = step {
+            self.push(step.bytes(), step);
         }
     }
 }
@@ -173,9 +182,10 @@ pub fn undo(world: &mut World) {
     let Some(last) = undo.steps.pop() else {
         return world.resource_mut::<Note>().tell("nothing to take back");
     };
-    if let Some(step) = exchange(world, last, "took a stroke back") {
-        world.resource_mut::<Undo>().undone.push(step.bytes(), step);
-    }
+    let (done, later) = exchange(world, last, "took a stroke back");
+    let Undo { steps, undone, .. } = &mut *world.resource_mut::<Undo>();
+    undone.keep(done);
+    steps.keep(later);
 }
 
 /// Does again what was taken back last, if nothing else was done since.
@@ -189,49 +199,67 @@ pub fn redo(world: &mut World) {
     let Some(last) = undo.undone.pop() else {
         return world.resource_mut::<Note>().tell("nothing to do again");
     };
-    if let Some(step) = exchange(world, last, "brought a stroke back") {
-        world.resource_mut::<Undo>().steps.push(step.bytes(), step);
-    }
+    let (done, later) = exchange(world, last, "brought a stroke back");
+    let Undo { steps, undone, .. } = &mut *world.resource_mut::<Undo>();
+    steps.keep(done);
+    undone.keep(later);
 }
 
-/// Makes it as it was, and tells so; what leads the other way. `of_stroke`: what is told of a stroke.
-fn exchange(world: &mut World, step: Step, of_stroke: &str) -> Option<Step> {
+/// Makes it as it was, and tells so. Returns what leads the other way, and what may be done later. `of_stroke`: what is told of a
+/// stroke.
+fn exchange(world: &mut World, step: Step, of_stroke: &str) -> (Option<Step>, Option<Step>) {
     let stroke = match step {
         Step::Stroke(stroke) => stroke,
         Step::Emitter(done) => {
             let (told, back) = done.take_back(world);
             world.resource_mut::<Note>().tell(told);
-            return back.map(Step::Emitter);
+            return (back.map(Step::Emitter), None);
         }
     };
-    let (back, wrong) = put_back(world, stroke);
+    let Exchanged { back, later, wrong } = put_back(world, stroke);
     let mut note = world.resource_mut::<Note>();
     match (wrong.is_empty(), back.is_empty()) {
         (true, _) => note.tell(of_stroke),
         (false, false) => note.complain(format!("{of_stroke}, but not everywhere: {}", wrong.join("; "))),
         (false, true) => note.complain(format!("the stroke stays as it is: {}", wrong.join("; "))),
     }
-    (!back.is_empty()).then_some(Step::Stroke(back))
+    let stroke = |surfaces: Vec<Before>| (!surfaces.is_empty()).then_some(Step::Stroke(surfaces));
+    (stroke(back), stroke(later))
 }
 
-/// Surfaces as they were; as they have been until now, and why others cannot be as they were.
-fn put_back(world: &mut World, stroke: Vec<Before>) -> (Vec<Before>, Vec<String>) {
+/// What became of the surfaces of a stroke.
+#[derive(Default)]
+struct Exchanged {
+    /// As they have been until now, of those that are as they were.
+    back: Vec<Before>,
+    /// Those that may be as they were later.
+    later: Vec<Before>,
+    /// Why others, and these, are not.
+    wrong: Vec<String>,
+}
+
+/// Surfaces as they were.
+fn put_back(world: &mut World, stroke: Vec<Before>) -> Exchanged {
     // Its last touches may still wait for a tick.
     if let Some(mut queue) = world.get_resource_mut::<BrushQueue>() {
         queue.0.clear();
     }
-    let (mut back, mut wrong) = (Vec::new(), Vec::new());
+    let mut exchanged = Exchanged::default();
     for Before { surface, kept } in stroke {
         let now = KeptSurface::of(world, surface);
         match kept.put_back(world, surface) {
-            Ok(()) => back.extend(now.map(|kept| Before { surface, kept })),
+            Ok(()) => exchanged.back.extend(now.map(|kept| Before { surface, kept })),
             Err(why) => {
                 let name = world.get::<Name>(surface).map_or("a surface", Name::as_str);
-                wrong.push(format!("{name} {why}"));
+                exchanged.wrong.push(format!("{name} {why}"));
+                // That passes.
+                if why == NotPutBack::Measured {
+                    exchanged.later.push(Before { surface, kept });
+                }
             }
         }
     }
-    (back, wrong)
+    exchanged
 }
 
 #[cfg(test)]
@@ -241,7 +269,7 @@ mod tests {
     use bevy::math::Affine3A;
     use bevy_weathering::collision::{MeshBvh, MeshTriangles, SurfaceCollider};
     use bevy_weathering::matter::SurfaceMatter;
-    use bevy_weathering::overlay::Wrap;
+    use bevy_weathering::overlay::{Unmapped, Wrap};
     use bevy_weathering::wetting::{SurfaceWater, TexelGeometry, WetGeometry};
 
     use super::*;
@@ -320,11 +348,27 @@ mod tests {
         let mut world = world();
         let plates = ["left", "right"].map(|name| plate(&mut world, name));
         paint(&mut world, &plates);
-        // Others needed its room.
-        world.entity_mut(plates[0]).remove::<SurfaceWater>();
+        let water = world.entity_mut(plates[0]).take::<SurfaceWater>().unwrap();
         undo(&mut world);
         let (text, is_wrong) = told(&world);
-        assert!(is_wrong && text.contains("left has no maps") && !text.contains("right"), "{text}");
+        assert!(is_wrong && text.contains("left is being measured") && !text.contains("right"), "{text}");
+        assert_eq!((film(&world, plates[1]), world.resource::<Undo>().counts()), (0, [1, 1]));
+        // What could not be done then is done now.
+        world.entity_mut(plates[0]).insert(water);
+        assert!(film(&world, plates[0]) > 0);
+        undo(&mut world);
+        assert_eq!((film(&world, plates[0]), told(&world).1), (0, false));
+        redo(&mut world);
+        redo(&mut world);
+        assert!(plates.iter().all(|&plate| film(&world, plate) > 0) && !told(&world).1);
+        assert_eq!(world.resource::<Undo>().counts(), [2, 0]);
+        // Others needed its room: nothing is there that could be taken back.
+        world.entity_mut(plates[0]).remove::<SurfaceWater>();
+        world.entity_mut(plates[0]).insert(Unmapped::Evicted);
+        undo(&mut world);
+        undo(&mut world);
+        let texts = told(&world);
+        assert_eq!(world.resource::<Undo>().counts(), [0, 1], "{texts:?}");
         assert_eq!(film(&world, plates[1]), 0);
         redo(&mut world);
         assert!(film(&world, plates[1]) > 0 && !told(&world).1);

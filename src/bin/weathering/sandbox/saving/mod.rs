@@ -69,6 +69,11 @@ impl Saving {
         matches!(self.0, Some(Step::Settling { .. } | Step::Reading { .. } | Step::Writing { .. }))
     }
 
+    /// What is done now is still in what is being saved.
+    pub fn will_take(&self) -> bool {
+        matches!(self.0, Some(Step::Settling { .. } | Step::Reading { .. }))
+    }
+
     /// Waits for what is being written; what is not that far yet is given up.
     pub fn finish(&mut self) {
         if let Some(Step::Writing { folder, task }) = self.0.take() {

@@ -88,6 +88,9 @@ fn restore(world: &mut World, folder: &Path, scene: &SavedScene) {
     let restored = scene.restore(world, &scenario, folder);
     // It was about the scene that was there.
     world.resource_mut::<Undo>().clear();
+    if restored.is_ok() {
+        world.resource_mut::<Unsaved>().0 = false;
+    }
     let mut note = world.resource_mut::<Note>();
     match restored {
         Ok(()) => note.tell(format!("went on from {}, paused", folder.display())),
