@@ -228,7 +228,10 @@ pub(super) fn plugin(app: &mut App) {
                 .before(super::StampSystems),
         )
         // Packing touches the water that is counted here.
-        .add_systems(PostUpdate, tally::tally.before(crate::wetting::gpu::WaterUploadSystems));
+        .add_systems(
+            PostUpdate,
+            tally::tally.after(super::deposit::note_traces).before(crate::wetting::gpu::WaterUploadSystems),
+        );
 }
 
 /// Spawn order, since that of entities and of queries says nothing.

@@ -6,14 +6,14 @@ use super::resize::Resizing;
 use super::{MapNeed, MapPool, MapSize, Unmapped};
 use crate::collision::{DeformingCollider, NotWeatherable};
 use crate::matter::SurfaceMatter;
-use crate::overlay::{SplatQueue, SurfaceFrames, SurfaceTotals, Weatherable};
+use crate::overlay::{SurfaceFrames, SurfaceTotals, SurfaceTraces, Weatherable};
 use crate::wetting::SurfaceWater;
 
 type Holder = (
     (&'static MapSize, &'static Weatherable, Has<DeformingCollider>, Option<&'static Resizing>),
     (
         &'static SurfaceTotals,
-        &'static SplatQueue,
+        &'static SurfaceTraces,
         Option<&'static SurfaceWater>,
         Option<&'static SurfaceMatter>,
         Has<SurfaceFrames>,
@@ -28,10 +28,10 @@ pub(super) fn tally(
 ) {
     let mut counts = MapPool { used: 0, reserved: 0, mapped: 0, reduced: 0, ..*pool };
     counts.unmapped = unmapped.iter().len() as u32;
-    for ((size, surface, is_posed, resizing), (totals, splats, water, matter, has_frames)) in &surfaces {
+    for ((size, surface, is_posed, resizing), (totals, traces, water, matter, has_frames)) in &surfaces {
         let hit = totals.last_tick > 0;
         let held = MapNeed {
-            colors: splats.has_painted(),
+            colors: traces.paint,
             rings: hit,
             water: water.is_some_and(SurfaceWater::is_wet),
             matter: matter.is_some_and(|matter| !matter.is_empty()),
