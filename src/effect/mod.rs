@@ -37,7 +37,7 @@ pub struct WeatherEffect {
     /// none.
     pub drops: DropSizes,
     /// Speed at which drag balances gravity, m/s, 0..=1000; 0 switches drag (and wind) off. Not given: that of its drops
-    /// ([`fall_speed`](drops::fall_speed)) or, of dust, of its grains ([`settling_speed`](drops::settling_speed)).
+    /// ([`fall_speed`]) or, of dust, of its grains ([`settling_speed`]).
     pub terminal_speed: Option<f32>,
     /// How fast it is swayed to and fro in still air, m/s; 0..=10. Flakes flutter. Needs drag.
     pub flutter: f32,
