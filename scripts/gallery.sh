@@ -7,10 +7,7 @@ build_program
 folder="$(mktemp -d)"
 screen_pid='' sandbox_pid=''
 finish() {
-    local pid
-    for pid in "${sandbox_pid}" "${screen_pid}"; do
-        [ -z "${pid}" ] || { kill "${pid}" && wait "${pid}"; } 2>/dev/null || true
-    done
+    end "${sandbox_pid}" "${screen_pid}"
     rm -rf "${folder}"
 }
 trap finish EXIT
@@ -55,8 +52,7 @@ sandbox() {
     xdotool mouseup 1 mousemove 800 200 key F12
     for _ in $(seq 100); do [ ! -s "${folder}/sandbox/screenshot_000.png" ] || break; sleep 0.2; done
     cp "${folder}/sandbox/screenshot_000.png" "docs/pictures/$2.png"
-    kill "${sandbox_pid}" "${screen_pid}"
-    wait "${sandbox_pid}" "${screen_pid}" 2>/dev/null || true
+    end "${sandbox_pid}" "${screen_pid}"
     sandbox_pid='' screen_pid=''
 }
 

@@ -75,6 +75,14 @@ virtual_screen() {
     export DISPLAY
 }
 
+# end PID...: ends processes that were started here, and waits for them. Empty ones are none.
+end() {
+    local pid
+    for pid in "$@"; do
+        [ -z "${pid}" ] || { kill "${pid}" && wait "${pid}"; } 2>/dev/null || true
+    done
+}
+
 # build_program [OPTION...]: builds `weathering`, and an example with it. What tests and examples depend on switches on features of
 # what Bevy depends on; a build without them would be another Bevy than the one of the tests, and take its time once more.
 build_program() {

@@ -21,10 +21,7 @@ rm -rf "${out}"/screenshot_*.png "${out}/saved"
 
 screen_pid='' sandbox_pid=''
 finish() {
-    local pid
-    for pid in "${sandbox_pid}" "${screen_pid}"; do
-        [ -z "${pid}" ] || { kill "${pid}" && wait "${pid}"; } 2>/dev/null || true
-    done
+    end "${sandbox_pid}" "${screen_pid}"
     rm -rf "${scratch}"
 }
 trap finish EXIT
