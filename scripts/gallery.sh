@@ -44,7 +44,7 @@ sandbox() {
         kill -0 "${sandbox_pid}" 2>/dev/null || { cat "${folder}/log" >&2; exit 1; }
         sleep 0.5
     done
-    xdotool windowfocus --sync "${window%%$'\n'*}" mousemove 440 220 mousedown 1
+    xdotool windowfocus --sync "${window%%$'\n'*}" mousemove 610 220 mousedown 1
     for _ in 1 2 3 4 5 6 7 8; do
         xdotool mousemove_relative 10 12
         sleep 1

@@ -40,12 +40,17 @@ fn tell(line: impl Display) {
     let _ = writeln!(std::io::stderr().lock(), "{line}");
 }
 
-/// Warnings go to standard error, in colour only where a terminal shows it and `NO_COLOR` is not set.
-fn log_warnings() {
+/// Whether what goes to standard error is in colour: only where a terminal shows it and `NO_COLOR` is not set.
+fn is_in_color() -> bool {
     let is_set = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+    std::io::stderr().is_terminal() && !is_set
+}
+
+/// Warnings go to standard error.
+fn log_warnings() {
     tracing_subscriber::fmt()
         .with_max_level(bevy::log::Level::WARN)
-        .with_ansi(std::io::stderr().is_terminal() && !is_set)
+        .with_ansi(is_in_color())
         .with_writer(std::io::stderr)
         // It would be told with `eprintln!`, which panics where nobody reads.
         .log_internal_errors(false)

@@ -89,7 +89,7 @@ impl View {
         self.distance = (self.distance * (1.0 - notches.clamp(-5.0, 5.0) * ZOOM)).clamp(0.05, 2000.0);
     }
 
-    /// Sees a box, from where it looks from; `fov`: vertical, radians.
+    /// Sees a box, from where it looks from; `fov`: the smaller one of height and width, radians.
     fn frame(&mut self, (low, high): (Vec3, Vec3), fov: f32) {
         let radius = ((high - low).length() * 0.5).max(0.01);
         self.target = (low + high) * 0.5;
@@ -188,12 +188,11 @@ fn frame_scene(
     }
 }
 
-/// Vertical, radians.
+/// Of height or width, whichever sees less; radians.
 fn field_of_view(projection: &Projection) -> f32 {
-    match projection {
-        Projection::Perspective(perspective) => perspective.fov,
-        _ => PerspectiveProjection::default().fov,
-    }
+    let usual = PerspectiveProjection::default();
+    let of = if let Projection::Perspective(perspective) = projection { perspective } else { &usual };
+    2.0 * ((of.fov * 0.5).tan() * of.aspect_ratio.min(1.0)).atan()
 }
 
 fn place(mut views: Query<(&View, &mut Transform), Changed<View>>) {
@@ -251,14 +250,16 @@ mod tests {
     fn what_is_framed_fits() {
         let mut view = View::new(EYE, TARGET);
         let (low, high) = (Vec3::new(-2.0, 0.0, -1.0), Vec3::new(4.0, 3.0, 1.0));
-        let fov = 40.0f32.to_radians();
-        view.frame((low, high), fov);
+        let lens = PerspectiveProjection { fov: 40.0f32.to_radians(), aspect_ratio: 0.6, ..default() };
+        let up = (lens.fov * 0.5).tan();
+        view.frame((low, high), field_of_view(&Projection::Perspective(lens)));
         let world_from_view = view.transform();
         for corner in 0..8u32 {
             let pick = |axis: u32, low: f32, high: f32| if corner >> axis & 1 == 0 { low } else { high };
             let point = Vec3::new(pick(0, low.x, high.x), pick(1, low.y, high.y), pick(2, low.z, high.z));
             let seen = world_from_view.compute_affine().inverse().transform_point3(point);
-            assert!(seen.z < 0.0 && (seen.y / -seen.z).abs() <= (fov * 0.5).tan() + 1e-3, "{seen}");
+            let [across, high] = [seen.x, seen.y].map(|of| of.abs() / -seen.z);
+            assert!(seen.z < 0.0 && high <= up + 1e-3 && across <= 0.6 * up + 1e-3, "{seen}");
         }
     }
 

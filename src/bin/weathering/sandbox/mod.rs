@@ -20,6 +20,7 @@ mod materials;
 mod model;
 mod open;
 mod pace;
+mod parts;
 mod plots;
 mod probe;
 mod record;
@@ -46,6 +47,7 @@ use std::time::Instant;
 
 use bevy::asset::{AssetPlugin, UnapprovedPathMode};
 use bevy::light::DirectionalLightShadowMap;
+use bevy::log::{BoxedFmtLayer, LogPlugin, tracing_subscriber};
 use bevy::prelude::*;
 use bevy::render::renderer::RenderAdapterInfo;
 use bevy::window::PrimaryWindow;
@@ -73,22 +75,24 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
         Window { title: "weathering".into(), resolution: (1280, 720).into(), visible: false, ..default() };
     // Closing the window is leaving, which may have to wait.
     let windows = WindowPlugin { primary_window: Some(window), close_when_requested: false, ..default() };
-    let mut app = App::new();
-    app.add_plugins(DefaultPlugins.set(task_pools(None)).set(windows).set(AssetPlugin {
+    let assets = AssetPlugin {
         file_path: loaded.tree.to_string_lossy().into_owned(),
         // Effects, stamps and pictures follow their files while one works on them.
         watch_for_changes_override: Some(true),
         // Scenes that are opened later may lie elsewhere. Each is kept within its own tree before it is shown.
         unapproved_path_mode: UnapprovedPathMode::Allow,
         ..default()
-    }))
-    .add_plugins(WeatheringPlugins)
-    .insert_resource(LiveBudget { frame_ms: pace::BUDGET_MS, ..default() })
-    .add_plugins((LiveBudgetPlugin, StageTimesPlugin))
-    // For the probe and the views.
-    .init_resource::<TrackSources>()
-    .insert_resource(AssetTree(loaded.tree.clone()))
-    .add_plugins(scenario);
+    };
+    let logs = LogPlugin { fmt_layer: |_| Some(log_layer()), ..default() };
+    let mut app = App::new();
+    app.add_plugins(DefaultPlugins.set(task_pools(None)).set(windows).set(assets).set(logs))
+        .add_plugins(WeatheringPlugins)
+        .insert_resource(LiveBudget { frame_ms: pace::BUDGET_MS, ..default() })
+        .add_plugins((LiveBudgetPlugin, StageTimesPlugin))
+        // For the probe and the views.
+        .init_resource::<TrackSources>()
+        .insert_resource(AssetTree(loaded.tree.clone()))
+        .add_plugins(scenario);
     model::light_shade(app.world_mut(), model::is_model(&arguments.file));
     app.insert_resource(open::Opened { loaded: first })
         .insert_resource(shots::OutFolder(arguments.out.clone()))
@@ -116,6 +120,12 @@ pub fn run(arguments: &SandboxArgs) -> Result<(), Box<dyn Error>> {
     if exit.is_error() { Err("the scene could not be shown; see above".into()) } else { Ok(()) }
 }
 
+/// What is told goes to standard error, and where nobody can read it, it is no fault.
+fn log_layer() -> BoxedFmtLayer {
+    let layer = tracing_subscriber::fmt::Layer::default().with_writer(std::io::stderr);
+    Box::new(layer.with_ansi(crate::is_in_color()).log_internal_errors(false))
+}
+
 /// What is in the bar.
 fn hose_and_time(app: &mut App) {
     app.add_plugins((pace::plugin, scenes::plugin, hose::plugin, brush::plugin, undo::plugin));
@@ -131,6 +141,7 @@ fn scene_panels(app: &mut App) {
             maps::plugin,
             plots::plugin,
             split::plugin,
+            parts::plugin,
         ));
 }
 

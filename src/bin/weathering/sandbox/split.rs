@@ -6,12 +6,11 @@
 
 mod copies;
 
+use bevy::camera::Exposure;
 use bevy::camera::visibility::RenderLayers;
-use bevy::camera::{CameraUpdateSystems, Exposure, Viewport};
 use bevy::core_pipeline::prepass::DepthPrepass;
 use bevy::light::{EnvironmentMapLight, Skybox};
 use bevy::prelude::*;
-use bevy::window::PrimaryWindow;
 use bevy_egui::egui;
 use bevy_weathering::collision::CollisionScene;
 use bevy_weathering::emitter::Emitter;
@@ -20,8 +19,8 @@ use bevy_weathering::record::Recording;
 use bevy_weathering::scenario::SceneEntity;
 
 use super::camera::View;
-use super::ui::{AddPanel, Place, UiCamera, UiInput};
-use super::{shots, theme};
+use super::theme;
+use super::ui::{AddPanel, Place};
 
 /// What both cameras see is in both of these layers.
 const LAYERS: [usize; 2] = [0, 1];
@@ -38,7 +37,7 @@ pub struct Split {
     /// Bounds of the scene without its copy.
     bounds: (Vec3, Vec3),
     /// Of the divider, in parts of the width that panels leave.
-    at: f32,
+    pub at: f32,
 }
 
 /// What stands for another entity in the copy.
@@ -54,15 +53,10 @@ pub fn plugin(app: &mut App) {
         .add_systems(
             PostUpdate,
             (
-                // Pictures may have other parts than the window has, and a camera draws what fits its part.
-                divide.after(shots::TakeSystems).before(CameraUpdateSystems),
                 follow_camera.before(TransformSystems::Propagate),
+                // Where everything is in this frame.
+                copies::follow_poses.run_if(resource_exists::<Split>).after(TransformSystems::Propagate),
             ),
-        )
-        .add_systems(
-            PostUpdate,
-            // Where everything is in this frame.
-            copies::follow_poses.run_if(resource_exists::<Split>).after(TransformSystems::Propagate),
         )
         .add_panel(Place::Side, "Compare", show);
 }
@@ -105,10 +99,6 @@ pub fn end(world: &mut World) {
     let mut copies = world.query_filtered::<Entity, Or<(With<CopyOf>, With<SecondCamera>)>>();
     for copy in copies.iter(world).collect::<Vec<_>>() {
         world.despawn(copy);
-    }
-    let mut cameras = world.query_filtered::<&mut Camera, With<View>>();
-    for mut camera in cameras.iter_mut(world) {
-        camera.viewport = None;
     }
 }
 
@@ -172,55 +162,6 @@ fn follow_emitters(
     }
 }
 
-/// Gives each camera its part of what panels leave of the window; of all of it in pictures without panels.
-fn divide(
-    // Not a condition of both systems: panels may end the comparison between it and the second one.
-    split: If<Res<Split>>,
-    input: Res<UiInput>,
-    panels: Query<&Camera, (With<UiCamera>, Without<View>, Without<SecondCamera>)>,
-    window: Query<&Window, With<PrimaryWindow>>,
-    mut first: Query<&mut Camera, (With<View>, Without<SecondCamera>)>,
-    mut second: Query<&mut Camera, With<SecondCamera>>,
-) {
-    let Ok(window) = window.single() else { return };
-    let free = input.free.filter(|_| panels.iter().any(|camera| camera.is_active));
-    let [left, right] = viewports(area(window.physical_size(), free), split.at);
-    for mut camera in &mut first {
-        set_viewport(&mut camera, left.clone());
-    }
-    for mut camera in &mut second {
-        set_viewport(&mut camera, right.clone());
-    }
-}
-
-fn set_viewport(camera: &mut Mut<Camera>, viewport: Viewport) {
-    let is_there = camera.viewport.as_ref().is_some_and(|there| {
-        (there.physical_position, there.physical_size) == (viewport.physical_position, viewport.physical_size)
-    });
-    if !is_there {
-        camera.viewport = Some(viewport);
-    }
-}
-
-/// The pixels of a window that panels leave free; all of them, if they leave none. At least two beside each other.
-fn area(size: UVec2, free: Option<Rect>) -> URect {
-    let whole = URect::from_corners(UVec2::ZERO, size.max(UVec2::new(2, 1)));
-    let free = free.map(|free| free.as_urect().intersect(whole));
-    free.filter(|free| free.width() >= 2 && free.height() >= 1).unwrap_or(whole)
-}
-
-/// Left and right of a divider; neither is empty, and together they are the area.
-fn viewports(area: URect, at: f32) -> [Viewport; 2] {
-    let width = area.width().max(2);
-    let left = ((width as f32 * at) as u32).clamp(1, width - 1);
-    let part = |x: u32, width: u32| Viewport {
-        physical_position: area.min + UVec2::new(x, 0),
-        physical_size: UVec2::new(width, area.height()),
-        ..default()
-    };
-    [part(0, left), part(left, width - left)]
-}
-
 fn follow_camera(
     split: If<Res<Split>>,
     first: Query<&Transform, (With<View>, Without<SecondCamera>)>,
@@ -273,31 +214,6 @@ pub fn show_divider(context: &egui::Context, free: egui::Rect, world: &mut World
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_two_parts_are_what_panels_leave() {
-        let free = Rect::new(340.0, 30.0, 1000.0, 550.0);
-        for (size, free, at) in [
-            ((1280, 720), None, 0.5),
-            ((1281, 720), Some(free), 0.3),
-            ((3, 1), None, 0.9),
-            ((0, 0), None, 0.1),
-            // Panels of a window that has become small since, and panels that leave nothing.
-            ((900, 400), Some(free), 0.5),
-            ((320, 200), Some(free), 0.5),
-            ((1280, 720), Some(Rect::new(340.0, 30.0, 340.0, 720.0)), 0.5),
-        ] {
-            let size = UVec2::from(size);
-            let area = area(size, free);
-            assert!(area.max.cmple(size.max(UVec2::new(2, 1))).all(), "{area:?}");
-            let [left, right] = viewports(area, at);
-            assert_eq!(left.physical_position, area.min);
-            assert_eq!(right.physical_position, area.min + UVec2::new(left.physical_size.x, 0));
-            assert!(left.physical_size.min_element() > 0 && right.physical_size.min_element() > 0);
-            assert_eq!(left.physical_size.x + right.physical_size.x, area.width());
-        }
-        assert_eq!(area(UVec2::new(1280, 720), Some(free)), URect::new(340, 30, 1000, 550));
-    }
 
     #[test]
     fn the_copy_is_out_of_the_way() {

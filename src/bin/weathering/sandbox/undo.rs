@@ -177,15 +177,7 @@ pub fn undo(world: &mut World) {
         record::take_back_stroke(world);
         return;
     }
-    let mut undo = world.resource_mut::<Undo>();
-    undo.end_stroke();
-    let Some(last) = undo.steps.pop() else {
-        return world.resource_mut::<Note>().tell("nothing to take back");
-    };
-    let (done, later) = exchange(world, last, "took a stroke back");
-    let Undo { steps, undone, .. } = &mut *world.resource_mut::<Undo>();
-    undone.keep(done);
-    steps.keep(later);
+    step(world, |Undo { steps, undone, .. }| (steps, undone), ["took a stroke back", "nothing to take back"]);
 }
 
 /// Does again what was taken back last, if nothing else was done since.
@@ -194,15 +186,29 @@ pub fn redo(world: &mut World) {
         // A stroke that is taken back out of a session has never been.
         return world.resource_mut::<Note>().tell("nothing is done again while a session is recorded");
     }
+    step(
+        world,
+        |Undo { steps, undone, .. }| (undone, steps),
+        ["brought a stroke back", "nothing to do again"],
+    );
+}
+
+/// Makes the last of one stack as it was, for the other to lead back. What is told of a stroke, and of an empty stack.
+fn step(
+    world: &mut World,
+    stacks: fn(&mut Undo) -> (&mut Stack<Step>, &mut Stack<Step>),
+    [of_stroke, of_none]: [&str; 2],
+) {
     let mut undo = world.resource_mut::<Undo>();
     undo.end_stroke();
-    let Some(last) = undo.undone.pop() else {
-        return world.resource_mut::<Note>().tell("nothing to do again");
+    let Some(last) = stacks(&mut undo).0.pop() else {
+        return world.resource_mut::<Note>().tell(of_none);
     };
-    let (done, later) = exchange(world, last, "brought a stroke back");
-    let Undo { steps, undone, .. } = &mut *world.resource_mut::<Undo>();
-    steps.keep(done);
-    undone.keep(later);
+    let (done, later) = exchange(world, last, of_stroke);
+    let mut undo = world.resource_mut::<Undo>();
+    let (from, to) = stacks(&mut undo);
+    to.keep(done);
+    from.keep(later);
 }
 
 /// Makes it as it was, and tells so. Returns what leads the other way, and what may be done later. `of_stroke`: what is told of a
