@@ -56,7 +56,12 @@ impl LoadedScenario {
 
     /// Checks an event by itself; what depends on those before it is not looked at.
     fn validate_event(&self, field: &str, event: &EventSpec) -> Result<(), ScenarioError> {
-        self.range(&format!("{field}.at"), event.at, 0.0, f64::from(self.scenario.seconds))?;
+        let last = self.scenario.seconds;
+        // Compared as coarsely as lengths are written down: 2.3 is no later than 2.3. NaN is not in time.
+        let is_in_time = event.at >= 0.0 && event.at as f32 <= last;
+        if !is_in_time {
+            return Err(self.value(format!("{field}.at"), event.at, format!("0 to {last}")));
+        }
         let field = format!("{field}.what.{}", event.what.kind());
         match &event.what {
             Action::Start(name) | Action::Stop(name) => self.validate_switch(&field, name),
@@ -233,11 +238,16 @@ mod tests {
 
     /// Why a scenario with these events is refused.
     fn refusal(events: &str) -> Option<String> {
+        refusal_within("10.0", events)
+    }
+
+    /// The same of a scenario that is so long.
+    fn refusal_within(seconds: &str, events: &str) -> Option<String> {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("e.effect.ron"), "()").unwrap();
         let text = format!(
             r#"(
-                seconds: 10.0,
+                seconds: {seconds},
                 camera: (keys: [(eye: (0.0, 1.0, 2.0), target: (0.0, 0.0, 0.0))]),
                 materials: {{"clay": ()}},
                 surfaces: [(name: "a", mesh: Ground(size: (1.0, 1.0), cells: (1, 1)), material: "clay")],
@@ -278,6 +288,18 @@ mod tests {
             (at: 5.0, what: Expect(quantity: Particles, below: 100.0)),
         "#;
         assert_eq!(refusal(all), None);
+    }
+
+    #[test]
+    fn the_very_end_is_in_time_whatever_its_digits() {
+        for seconds in ["2.3", "0.1", "10.04", "86399.99"] {
+            assert_eq!(refusal_within(seconds, &format!("(at: {seconds}, what: Start(\"rain\"))")), None);
+        }
+        for at in ["2.301", "-0.001", "NaN"] {
+            let event = format!("(at: {at}, what: Start(\"rain\"))");
+            let error = refusal_within("2.3", &event).unwrap_or_default();
+            assert!(error.contains("`events[0].at`") && error.ends_with("0 to 2.3"), "{at}: {error}");
+        }
     }
 
     #[test]
