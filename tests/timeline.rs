@@ -197,6 +197,27 @@ fn expectations_decide_how_a_run_ends() {
 }
 
 #[test]
+fn what_looks_at_the_very_end_is_done() {
+    let folder = Folder::new();
+    // 50.4 ticks, and less than half a tick.
+    for (seconds, ticks) in [("2.52", 50.0), ("0.004", 1.0)] {
+        let scene = SCENE.replace("seconds: 4.0", &format!("seconds: {seconds}"));
+        let events = format!(
+            r#"(at: {seconds}, what: Expect(quantity: Particles, above: 1.0e9)),
+            (at: {seconds}, what: Export("end")),"#
+        );
+        let file = folder.file("short.ron", &format!("({scene} events: [{events}])"));
+        let out = folder.0.path().join(format!("out_{seconds}"));
+        let outcome = run(replay(file, "--no-render --out").arg(&out));
+        assert_eq!(outcome.code, Some(1), "{seconds}: {}", outcome.stderr);
+        let report = read_report(&out);
+        assert_eq!(number(&report["ticks"]), ticks);
+        assert_eq!(report["expectations"][0]["holds"], false, "{report}");
+        assert!(out.join("export_end").is_dir(), "{seconds}");
+    }
+}
+
+#[test]
 fn pictures_are_taken_by_name() {
     if crate::common::skips_gpu() {
         return;

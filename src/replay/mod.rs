@@ -42,6 +42,7 @@ use crate::clock::WeatheringClock;
 use crate::export::Export;
 use crate::overlay::SplatStats;
 use crate::save::{ColorMaps, SavedScene};
+use crate::scenario::ticks_in;
 use crate::schedule::TickHold;
 
 pub(crate) use app::headless;
@@ -82,7 +83,7 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
     }
     let clock = *run.app.world().resource::<WeatheringClock>();
     let seconds = options.seconds.unwrap_or(options.scenario.scenario.seconds);
-    let ticks = (f64::from(seconds) * f64::from(clock.hz())).round() as u32;
+    let ticks = ticks_in(seconds, clock.hz());
     let mut tick = clock.tick();
     if ticks < tick {
         let expected = format!("at least {}, the time of the saved scene", clock.seconds());

@@ -60,6 +60,7 @@ pub use timeline::{
     ExpectationOutcome, Expectations, MaterialChange, Quantity, WeatherChange,
 };
 pub(crate) use timeline::{
-    append_events, beginning_of, captures, exchange_events, exports, rewind, tick_from, weather_is_changing,
+    append_events, beginning_of, captures, exchange_events, exports, rewind, tick_from, ticks_in,
+    weather_is_changing,
 };
 pub(crate) use validate::check_weather;

@@ -34,7 +34,7 @@ pub struct Scenario {
     /// Ticks per second, 1..=1000.
     #[serde(default = "default_hz")]
     pub tick_hz: u32,
-    /// Length, up to [`Self::MAX_SECONDS`].
+    /// Length, up to [`Self::MAX_SECONDS`]; rounded to ticks, of which there is at least one.
     pub seconds: f32,
     /// m/s².
     #[serde(default = "default_gravity")]

@@ -31,7 +31,7 @@ pub struct ScenarioPart {
     pub seed: Option<u64>,
     /// Ticks per second, 1..=1000.
     pub tick_hz: Option<u32>,
-    /// Length, s, above 0 to a day.
+    /// Length, s, above 0 to a day; rounded to ticks, of which there is at least one.
     pub seconds: Option<f32>,
     /// m/s².
     #[schemars(with = "Option<[f32; 3]>")]

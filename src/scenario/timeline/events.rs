@@ -16,7 +16,7 @@ use crate::scenario::EmitterSpec;
 #[serde(deny_unknown_fields)]
 pub struct EventSpec {
     /// Seconds, 0 to the length of the scenario. What acts does so in the first tick that begins then or later; what looks
-    /// sees the end of the first tick that ends then or later.
+    /// sees the end of the first tick that ends then or later, or of the last one.
     pub at: f64,
     /// What happens.
     pub what: Action,

@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use serde::Serialize;
 
-use super::{Action, Expectation, Quantity, due, in_order, tick_at};
+use super::{Action, Expectation, Quantity, due, in_order, seen_at};
 use crate::clock::WeatheringClock;
 use crate::matter::SurfaceMatter;
 use crate::matter::wash::GRAIN_DENSITY;
@@ -41,7 +41,7 @@ impl Expectations {
         for (event, spec) in in_order(scenario) {
             let Action::Expect(expectation) = &spec.what else { continue };
             // Before the first tick there is nothing to see.
-            all.ticks.push(tick_at(spec.at, scenario.tick_hz).max(1));
+            all.ticks.push(seen_at(spec.at, scenario).max(1));
             let surface = expectation.surface.as_deref();
             all.surfaces.push(surface.and_then(|name| scenario.surface_number(name)));
             let expectation = expectation.clone();

@@ -6,7 +6,8 @@
 //! into the [`Digest`](super::Digest), too. At the end of each tick expectations are looked at ([`expect`](Expectations)).
 //!
 //! An event at second `at` acts in the first tick that begins then or later, as an emitter's `start` does; what only looks
-//! sees the end of the first tick that ends then or later. So an expectation sees nothing of what happens at its own time.
+//! sees the end of the first tick that ends then or later, or of the last one there is: a length is rounded to whole ticks. So an
+//! expectation sees nothing of what happens at its own time.
 
 mod append;
 mod apply;
@@ -44,6 +45,17 @@ pub(crate) fn tick_at(seconds: f64, hz: u32) -> u32 {
 /// The tick that is the first to begin at this second or later.
 pub(crate) fn tick_from(seconds: f64, hz: u32) -> u32 {
     tick_at(seconds, hz).saturating_add(1)
+}
+
+/// Ticks of a run of so many seconds: to the nearest, and one at least.
+pub(crate) fn ticks_in(seconds: f32, hz: u32) -> u32 {
+    (f64::from(seconds) * f64::from(hz)).round().max(1.0) as u32
+}
+
+/// The tick whose end is seen by what looks at this second.
+fn seen_at(seconds: f64, scenario: &Scenario) -> u32 {
+    // Where half a tick is cut off at the end, what looks in it would never do so.
+    tick_at(seconds, scenario.tick_hz).min(ticks_in(scenario.seconds, scenario.tick_hz))
 }
 
 /// The second at which a tick begins: what happens then happens in it.
@@ -105,7 +117,7 @@ fn named<'a>(
 ) -> Vec<(u32, &'a str)> {
     let named = in_order(scenario)
         .into_iter()
-        .filter_map(|(_, event)| Some((tick_at(event.at, scenario.tick_hz), name_of(&event.what)?.as_str())));
+        .filter_map(|(_, event)| Some((seen_at(event.at, scenario), name_of(&event.what)?.as_str())));
     named.collect()
 }
 
@@ -149,6 +161,24 @@ mod tests {
         for tick in 1..2000 {
             assert_eq!(tick_from(f64::from(tick - 1) / 60.0, 60), tick);
         }
+    }
+
+    #[test]
+    fn a_run_has_whole_ticks_and_one_at_least() {
+        for (seconds, hz, ticks) in [(10.0, 10, 100), (10.04, 10, 100), (10.06, 10, 101), (0.004, 60, 1)] {
+            assert_eq!(ticks_in(seconds, hz), ticks, "{seconds}");
+        }
+        assert_eq!(ticks_in(Scenario::MAX_SECONDS, 1000), 86_400_000);
+    }
+
+    #[test]
+    fn what_looks_at_the_end_sees_the_last_tick() {
+        let events = r#"[(at: 10.04, what: Capture("end")), (at: 9.99, what: Export("end"))]"#;
+        let of_length = |seconds: f32| Scenario { seconds, ..scenario(events) };
+        let short = of_length(10.04);
+        assert_eq!((captures(&short), exports(&short)), (vec![(100, "end")], vec![(100, "end")]));
+        // Where there is more to come, the first that ends then or later.
+        assert_eq!(captures(&of_length(20.0)), [(101, "end")]);
     }
 
     #[test]
