@@ -243,6 +243,24 @@ fn another_seed_is_another_run() {
 }
 
 #[test]
+fn a_longer_run_is_that_of_a_longer_scenario() {
+    let tree = Tree::new();
+    let report = |file: &Path, options: &str| {
+        without_timing(run(&mut replay(file, &format!("--no-render {options}"))).report())
+    };
+    let kept = tree.path("kept");
+    let own = run(replay(tree.tap(), "--no-render --save-state").arg(&kept)).report();
+    let longer = report(&tree.tap(), "--seconds 2");
+    let gone_on = run(replay(tree.tap(), "--no-render --seconds 2 --resume").arg(&kept)).report();
+    assert_eq!(gone_on["digest"], longer["digest"]);
+    let emitted = |report: &Value| number(&report["particles"]["emitted"]);
+    assert!(emitted(&longer) > emitted(&own) + 200.0, "{longer}");
+    let mut expected = report(&tree.spoilt("seconds: 1.0", "seconds: 2.0"), "");
+    expected["scenario"] = longer["scenario"].clone();
+    assert_eq!(longer, expected);
+}
+
+#[test]
 fn the_numbers_of_a_report_add_up() {
     let report = run(&mut replay(HOSE, "--no-render --seconds 2")).report();
     assert_eq!((number(&report["ticks"]), number(&report["seconds"])), (120.0, 2.0));

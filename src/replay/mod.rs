@@ -76,6 +76,7 @@ pub struct Progress {
 pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Result<Report, ReplayError> {
     let begun = Instant::now();
     let every = options.check()?;
+    let options = &options.with_scenario_to_the_end();
     let saved = options.resume.as_deref().map(SavedScene::read).transpose()?;
     let mut run = Run::load(options)?;
     if let (Some(saved), Some(folder)) = (&saved, &options.resume) {

@@ -23,6 +23,19 @@ pub(super) struct Run<'a> {
     pub(super) failed_export: Option<ReplayError>,
 }
 
+impl ReplayOptions {
+    /// With the scenario as long as the run, if that is longer: what goes on to the end of the one goes on to that of the other. A
+    /// shorter run leaves it as it is, since it may be gone on with. What was saved fits: that is decided by the file.
+    pub(super) fn with_scenario_to_the_end(&self) -> Self {
+        let mut options = self.clone();
+        if let Some(seconds) = self.seconds {
+            let scenario = &mut options.scenario.scenario;
+            scenario.seconds = scenario.seconds.max(seconds);
+        }
+        options
+    }
+}
+
 impl<'a> Run<'a> {
     /// Builds the app and waits until the scene is there.
     pub(super) fn load(options: &'a ReplayOptions) -> Result<Self, ReplayError> {
