@@ -131,12 +131,19 @@ fn switch_by_events(scenario: &mut Scenario, length: f32, events: &mut Vec<Event
         if is_switched {
             continue;
         }
-        let event = |at: f32, what: Action| EventSpec { at: f64::from(at), what };
-        if spec.start > 0.0 {
-            events.push(event(0.0, Action::Stop(spec.name.clone())));
-            events.push(event(spec.start, Action::Start(spec.name.clone())));
+        let (start, stop) = (spec.start, spec.stop.unwrap_or(length));
+        let mut add = |at: f32, what: Action| events.push(EventSpec { at: f64::from(at), what });
+        // One that stops before it starts never works; by events of both it would start for good.
+        let works = start < stop;
+        if start > 0.0 || !works {
+            add(0.0, Action::Stop(spec.name.clone()));
         }
-        events.push(event(spec.stop.unwrap_or(length), Action::Stop(spec.name.clone())));
+        if works {
+            if start > 0.0 {
+                add(start, Action::Start(spec.name.clone()));
+            }
+            add(stop, Action::Stop(spec.name.clone()));
+        }
         (spec.start, spec.stop) = (0.0, None);
     }
 }
@@ -260,6 +267,27 @@ mod tests {
         assert!(prepare(&loaded, beginning.clone(), &folder).is_err());
         let again = prepare(&base, beginning, &to.path().join("again")).unwrap();
         assert_eq!(again.scenario.emitters.len(), 3);
+    }
+
+    #[test]
+    fn hours_become_events_and_who_never_works_never_does() {
+        let folder = tempfile::tempdir().unwrap();
+        let base = scene(folder.path()).scenario;
+        let switched = |start: f32, stop: Option<f32>| -> Vec<_> {
+            let mut scenario = base.clone();
+            scenario.emitters.truncate(1);
+            (scenario.emitters[0].start, scenario.emitters[0].stop) = (start, stop);
+            let mut events = Vec::new();
+            switch_by_events(&mut scenario, 3.0, &mut events);
+            let hours = (scenario.emitters[0].start, scenario.emitters[0].stop);
+            assert_eq!(hours, (0.0, None));
+            events.iter().map(|event| (event.at, event.what.kind())).collect()
+        };
+        assert_eq!(switched(0.0, None), [(3.0, "Stop")]);
+        assert_eq!(switched(0.5, Some(1.0)), [(0.0, "Stop"), (0.5, "Start"), (1.0, "Stop")]);
+        for (start, stop) in [(2.0, Some(1.0)), (1.0, Some(1.0)), (0.0, Some(0.0)), (4.0, None)] {
+            assert_eq!(switched(start, stop), [(0.0, "Stop")], "{start} {stop:?}");
+        }
     }
 
     #[test]
