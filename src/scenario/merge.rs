@@ -11,6 +11,17 @@ use super::{EmitterSpec, ScenarioPart, SceneSpec, SurfaceSpec};
 struct Origin {
     file: PathBuf,
     field: String,
+    /// Where it was changed since: what holds the changed field, by the field's name.
+    changed: BTreeMap<&'static str, Origin>,
+}
+
+impl Origin {
+    /// The file and the field there of something in it; `rest` is behind its own field, and begins with `.` if it is not empty.
+    fn find(&self, rest: &str) -> (PathBuf, String) {
+        let name = rest.trim_start_matches('.').split(['.', '[']).next();
+        let Self { file, field, .. } = name.and_then(|name| self.changed.get(name)).unwrap_or(self);
+        (file.clone(), format!("{field}{rest}"))
+    }
 }
 
 /// Where what of a scenario was written that can come from several files.
@@ -44,7 +55,7 @@ impl Origins {
             };
             (list.get(index.parse::<usize>().ok()?)?, rest)
         };
-        Some((origin.file.clone(), format!("{}{rest}", origin.field)))
+        Some(origin.find(rest))
     }
 }
 
@@ -80,7 +91,11 @@ impl Merged {
     /// Lays a part over what is there. `prefix` is that of its fields in the file. An error is the name of an emitter that
     /// is to be changed but is not there.
     pub(super) fn lay(&mut self, over: ScenarioPart, file: &Path, prefix: &str) -> Result<(), String> {
-        let origin = |field: String| Origin { file: file.into(), field: format!("{prefix}{field}") };
+        let origin = |field: String| Origin {
+            file: file.into(),
+            field: format!("{prefix}{field}"),
+            changed: BTreeMap::new(),
+        };
         let Self { part, origins } = self;
         replace(&mut part.seed, over.seed);
         replace(&mut part.tick_hz, over.tick_hz);
@@ -125,8 +140,10 @@ impl Merged {
             let Some(index) = part.emitters.iter().position(|emitter| emitter.name == name) else {
                 return Err(name);
             };
+            let from = origin(format!("emitter_changes.{name}"));
+            let changed = change.fields().map(|field| (field, from.clone()));
+            origins.emitters[index].changed.extend(changed);
             change.make(&mut part.emitters[index]);
-            origins.emitters[index] = origin(format!("emitter_changes.{name}"));
         }
         Ok(())
     }
@@ -180,10 +197,37 @@ mod tests {
         assert_eq!(found("events[1].at"), expected("high.ron", "variants.x.events[0].at"));
         assert_eq!(found("emitters[1].rate"), expected("high.ron", "variants.x.emitters[0].rate"));
         assert_eq!(found("emitters[0].rate"), expected("high.ron", "variants.x.emitter_changes.rain.rate"));
+        // What it does not change is where it was.
+        assert_eq!(found("emitters[0].stop"), expected("high.ron", "variants.x.emitter_changes.rain.stop"));
+        assert_eq!(found("emitters[0].lifetime"), expected("low.ron", "emitters[0].lifetime"));
+        assert_eq!(found("emitters[0].keys[0].t"), expected("low.ron", "emitters[0].keys[0].t"));
+        assert_eq!(found("emitters[0]"), expected("low.ron", "emitters[0]"));
         assert_eq!(found("materials.a.roughness"), expected("high.ron", "variants.x.materials.a.roughness"));
         assert_eq!(found("materials.a.b"), expected("low.ron", "materials.a.b"));
         assert_eq!(found("seconds"), None);
         assert_eq!(found("events[9].at"), None);
+    }
+
+    #[test]
+    fn changes_are_of_the_emitter_that_they_were_made_to() {
+        let mut merged = Merged::default();
+        merged.lay(part(&format!("(emitters: [{}])", emitter("rain", 1.0))), Path::new("a"), "").unwrap();
+        for (file, text) in [
+            ("b", r#"(emitter_changes: {"rain": (rate: 2.0, flow: LitresPerMinute(3.0))})"#),
+            ("c", r#"(emitter_changes: {"rain": (rate: 4.0)})"#),
+        ] {
+            merged.lay(part(text), Path::new(file), "").unwrap();
+        }
+        let found = |merged: &Merged, field: &str| {
+            let (file, field) = merged.origins.find(&format!("emitters[0].{field}")).unwrap();
+            format!("{}: {field}", file.display())
+        };
+        assert_eq!(found(&merged, "rate"), "c: emitter_changes.rain.rate");
+        assert_eq!(found(&merged, "flow"), "b: emitter_changes.rain.flow");
+        assert_eq!(found(&merged, "speed"), "a: emitters[0].speed");
+        // As a whole it is another one.
+        merged.lay(part(&format!("(emitters: [{}])", emitter("rain", 5.0))), Path::new("d"), "").unwrap();
+        assert_eq!(found(&merged, "rate"), "d: emitters[0].rate");
     }
 
     #[test]

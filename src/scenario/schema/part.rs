@@ -122,6 +122,22 @@ impl WeatherPart {
 }
 
 impl EmitterChange {
+    /// The names of the fields that it changes.
+    pub(in crate::scenario) fn fields(&self) -> impl Iterator<Item = &'static str> {
+        let Self { effect, rate, flow, speed, spread_deg, lifetime, start, stop } = self;
+        let fields = [
+            ("effect", effect.is_some()),
+            ("rate", rate.is_some()),
+            ("flow", flow.is_some()),
+            ("speed", speed.is_some()),
+            ("spread_deg", spread_deg.is_some()),
+            ("lifetime", lifetime.is_some()),
+            ("start", start.is_some()),
+            ("stop", stop.is_some()),
+        ];
+        fields.into_iter().filter_map(|(field, is_changed)| is_changed.then_some(field))
+    }
+
     /// Makes the change.
     pub(in crate::scenario) fn make(self, emitter: &mut EmitterSpec) {
         let Self { effect, rate, flow, speed, spread_deg, lifetime, start, stop } = self;
