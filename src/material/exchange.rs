@@ -125,8 +125,9 @@ pub(super) fn release_surface(
     let Ok(material) = dry.get(removed.entity) else { return };
     commands
         .entity(removed.entity)
-        .try_remove::<(MeshMaterial3d<WeatheredMaterial>, DryMaterial)>()
-        .try_insert(MeshMaterial3d(material.0.clone()));
+        // Given back while it still has the other: who watches for new materials can tell that this is none.
+        .try_insert(MeshMaterial3d(material.0.clone()))
+        .try_remove::<(MeshMaterial3d<WeatheredMaterial>, DryMaterial)>();
 }
 
 /// What is taken away is an edit, too.
