@@ -56,7 +56,7 @@ pub mod prelude {
     pub use crate::effect::{Carries, WeatherEffect};
     pub use crate::emitter::{Emitter, EmitterShape, Flow};
     pub use crate::material::{
-        Flood, PlayedWetMap, PorousMaterial, StandingWater, WettingModel, WettingTextures,
+        DryMaterial, Flood, PlayedWetMap, PorousMaterial, StandingWater, WettingModel, WettingTextures,
     };
     pub use crate::matter::MatterLook;
     pub use crate::overlay::{MapBudget, OverlayUv, StampSpace, Weatherable, Wrap};

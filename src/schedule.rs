@@ -67,20 +67,25 @@ impl Plugin for WeatheringSchedulePlugin {
 #[derive(Resource, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[reflect(Resource)]
 pub struct TickHold {
-    /// Whether the next tick is left out. Set by those who cannot keep up: so that maps are painted whole,
-    /// [`GpuOverlayPlugin`](crate::overlay::GpuOverlayPlugin).
+    /// Whether ticks are left out until you say otherwise. Yours alone: nobody else sets it.
+    pub is_paused: bool,
+    /// Whether the next tick is left out. Set, and set back, by those who cannot keep up: so that maps are painted whole,
+    /// [`GpuOverlayPlugin`](crate::overlay::GpuOverlayPlugin), before each tick.
     pub is_held: bool,
-    /// Ticks left out so far.
+    /// Ticks that were held so far. Those of a pause are not among them: nobody lags behind.
     pub ticks: u64,
 }
 
 /// The whole tick, as one system that others in [`FixedUpdate`] can be ordered against.
 pub fn run_tick(world: &mut World) {
-    if let Some(mut hold) = world.get_resource_mut::<TickHold>()
-        && hold.is_held
-    {
-        hold.ticks += 1;
-        return;
+    if let Some(mut hold) = world.get_resource_mut::<TickHold>() {
+        if hold.is_paused {
+            return;
+        }
+        if hold.is_held {
+            hold.ticks += 1;
+            return;
+        }
     }
     world.run_schedule(WeatheringTick);
 }
@@ -93,13 +98,21 @@ mod tests {
     struct Ran(u32);
 
     #[test]
-    fn held_ticks_are_counted_and_not_run() {
+    fn held_ticks_are_counted_and_not_run_and_those_of_a_pause_are_neither() {
         let mut app = App::new();
         app.add_plugins(WeatheringSchedulePlugin)
             .init_resource::<Ran>()
             .add_systems(WeatheringTick, |mut ran: ResMut<Ran>| ran.0 += 1);
-        for (is_held, expected) in [(false, (1, 0)), (true, (1, 1)), (true, (1, 2)), (false, (2, 2))] {
-            app.world_mut().resource_mut::<TickHold>().is_held = is_held;
+        for (is_held, is_paused, expected) in [
+            (false, false, (1, 0)),
+            (true, false, (1, 1)),
+            (true, false, (1, 2)),
+            (true, true, (1, 2)),
+            (false, true, (1, 2)),
+            (false, false, (2, 2)),
+        ] {
+            let mut hold = app.world_mut().resource_mut::<TickHold>();
+            (hold.is_held, hold.is_paused) = (is_held, is_paused);
             run_tick(app.world_mut());
             assert_eq!((app.world().resource::<Ran>().0, app.world().resource::<TickHold>().ticks), expected);
         }

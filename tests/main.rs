@@ -44,6 +44,8 @@ mod gpu {
     mod broken;
     /// What a picture shows on either side of each edge of a mesh.
     mod edges;
+    /// Materials that are exchanged and given back.
+    mod exchange;
     /// Exported scenes in a renderer that knows nothing of weathering.
     mod exported;
     /// Ticks and frames.

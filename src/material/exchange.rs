@@ -7,15 +7,16 @@ use bevy::prelude::*;
 use super::uniform::SurfaceLook;
 use super::warm_up::{ShaderChanges, Understudy, part_of, rehearse};
 use super::{
-    ClockBuffer, PlayedWetMap, PorousExtension, PorousMaterial, StandingWater, WeatheredMaterial,
-    WettingTextures,
+    ClockBuffer, MatterUniform, PlayedWetMap, PorousExtension, PorousMaterial, StandingWater,
+    WeatheredMaterial, WettingTextures,
 };
 use crate::clock::WeatheringClock;
 use crate::collision::UvSet;
 use crate::matter::MatterLook;
 use crate::overlay::{MapSize, Overlays, SurfaceTraces, TexelArea, Weatherable};
 
-/// The material a weathered entity had. Its asset may go on being edited: the weathered form follows.
+/// The material a weathered entity had, in the place of its `MeshMaterial3d<StandardMaterial>`. Its asset may go on being edited:
+/// the weathered form follows. It follows another handle, too, put here or inserted as a `MeshMaterial3d<StandardMaterial>`.
 #[derive(Component, Reflect, Debug, Clone)]
 #[reflect(Component)]
 pub struct DryMaterial(pub Handle<StandardMaterial>);
@@ -30,8 +31,12 @@ type Surface = (
     Option<&'static UvSet>,
 );
 
+/// What a surface may have, or not.
+type Optional = (PorousMaterial, StandingWater, WettingTextures, PlayedWetMap);
+
 /// What changes the constants of a surface.
 type Edited = Or<(
+    Changed<DryMaterial>,
     Changed<PorousMaterial>,
     Changed<StandingWater>,
     Changed<WettingTextures>,
@@ -120,11 +125,19 @@ pub(super) fn release_surface(
     let Ok(material) = dry.get(removed.entity) else { return };
     commands
         .entity(removed.entity)
-        .try_remove::<(MeshMaterial3d<WeatheredMaterial>, DryMaterial)>()
-        .try_insert(MeshMaterial3d(material.0.clone()));
+        // Given back while it still has the other: who watches for new materials can tell that this is none.
+        .try_insert(MeshMaterial3d(material.0.clone()))
+        .try_remove::<(MeshMaterial3d<WeatheredMaterial>, DryMaterial)>();
 }
 
-/// Copies edits of a dry material into the weathered ones made from it.
+/// What is taken away is an edit, too.
+pub(super) fn note_removed(removed: On<Remove, Optional>, mut surfaces: Query<&mut DryMaterial>) {
+    if let Ok(mut dry) = surfaces.get_mut(removed.entity) {
+        dry.set_changed();
+    }
+}
+
+/// Copies edits of a dry material into the weathered ones made from it; of one that was waited for, too.
 pub(super) fn follow_dry_materials(
     mut events: MessageReader<AssetEvent<StandardMaterial>>,
     standard: Res<Assets<StandardMaterial>>,
@@ -132,7 +145,7 @@ pub(super) fn follow_dry_materials(
     surfaces: Query<(&DryMaterial, &MeshMaterial3d<WeatheredMaterial>)>,
 ) {
     for event in events.read() {
-        let AssetEvent::Modified { id } = event else { continue };
+        let (AssetEvent::Added { id } | AssetEvent::Modified { id }) = event else { continue };
         let Some(dry) = standard.get(*id) else { continue };
         for (_, material) in surfaces.iter().filter(|(material, _)| material.0.id() == *id) {
             if let Some(mut material) = weathered.get_mut(material) {
@@ -191,11 +204,31 @@ pub(super) fn follow_surfaces(
     }
 }
 
+/// Copies another look of dust, mud and snow into all weathered materials, those that are rehearsed among them.
+pub(super) fn follow_matter_look(
+    matter: Res<MatterLook>,
+    mut weathered: ResMut<Assets<WeatheredMaterial>>,
+    shown: Query<&MeshMaterial3d<WeatheredMaterial>>,
+) {
+    if !matter.is_changed() {
+        return;
+    }
+    let look = MatterUniform::from(&*matter);
+    for handle in &shown {
+        if let Some(mut material) = weathered.get_mut(handle)
+            && material.extension.look != look
+        {
+            material.extension.look = look;
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use bevy::light::NotShadowCaster;
 
     use super::*;
+    use crate::material::Flood;
 
     /// A surface on which nothing has fallen yet, and what follows it.
     struct Stage {
@@ -223,10 +256,12 @@ mod tests {
             world.insert_resource(ShaderChanges::WhenCompiled);
             world.insert_resource(weathered);
             world.insert_resource(standard);
+            world.init_resource::<Messages<AssetEvent<StandardMaterial>>>();
+            world.add_observer(note_removed);
             let surface =
                 world.spawn((maps, traces, dry, MeshMaterial3d(material), Mesh3d(Handle::default()))).id();
             let mut follow = Schedule::default();
-            follow.add_systems(follow_surfaces);
+            follow.add_systems((follow_dry_materials, follow_surfaces, follow_matter_look).chain());
             follow.run(&mut world);
             Self { world, follow, surface }
         }
@@ -272,6 +307,64 @@ mod tests {
             assert_eq!(stage.understudies(), first);
             assert_eq!(stage.shown_by(first[0]).extension.params.t_fill, t_fill);
             assert_eq!(stage.shown_by(stage.surface).extension.params.t_fill, t_fill);
+        }
+    }
+
+    /// What is seen of a surface changes with something that it gets, and is as before when that is taken away.
+    fn comes_and_goes<C: Component>(component: C) {
+        let mut stage = Stage::new(StandardMaterial::default());
+        stage.world.insert_resource(ShaderChanges::AtOnce);
+        let look = |stage: &Stage| {
+            let extension = &stage.shown_by(stage.surface).extension;
+            (extension.key, extension.params)
+        };
+        let bare = look(&stage);
+        stage.world.entity_mut(stage.surface).insert(component);
+        stage.follow.run(&mut stage.world);
+        assert_ne!(look(&stage), bare);
+        stage.world.entity_mut(stage.surface).remove::<C>();
+        stage.follow.run(&mut stage.world);
+        assert_eq!(look(&stage), bare);
+    }
+
+    #[test]
+    fn what_is_taken_away_is_not_seen_any_more() {
+        comes_and_goes(PorousMaterial { t_fill: 7.0, ..default() });
+        let flood = Flood::Accumulation { cracks: 0.5, puddles: 0.5 };
+        comes_and_goes(StandingWater { flood, ..default() });
+        comes_and_goes(WettingTextures { surface: Some(Handle::default()), ..default() });
+        comes_and_goes(PlayedWetMap::default());
+    }
+
+    #[test]
+    fn another_dry_material_is_seen_once_it_is_there() {
+        let mut stage = Stage::new(StandardMaterial::default());
+        let [red, blue] = [Color::srgb(1.0, 0.0, 0.0), Color::srgb(0.0, 0.0, 1.0)];
+        let show = |stage: &mut Stage, material: Handle<StandardMaterial>| {
+            stage.world.get_mut::<DryMaterial>(stage.surface).unwrap().0 = material;
+            stage.follow.run(&mut stage.world);
+            stage.shown_by(stage.surface).base.base_color
+        };
+        let there = stage.world.resource_mut::<Assets<StandardMaterial>>().add(red);
+        assert_eq!(show(&mut stage, there), red);
+        let awaited = stage.world.resource::<Assets<StandardMaterial>>().reserve_handle();
+        assert_eq!(show(&mut stage, awaited.clone()), red);
+        let mut materials = stage.world.resource_mut::<Assets<StandardMaterial>>();
+        materials.insert(&awaited, blue.into()).unwrap();
+        stage.world.write_message(AssetEvent::Added { id: awaited.id() });
+        stage.follow.run(&mut stage.world);
+        assert_eq!(stage.shown_by(stage.surface).base.base_color, blue);
+    }
+
+    #[test]
+    fn all_surfaces_take_another_look_of_dust_at_once() {
+        let mut stage = Stage::new(StandardMaterial::default());
+        stage.wet(true);
+        stage.world.resource_mut::<MatterLook>().dust_color = [1.0, 0.0, 0.0];
+        stage.follow.run(&mut stage.world);
+        let understudy = stage.understudies()[0];
+        for shown in [stage.surface, understudy] {
+            assert_eq!(stage.shown_by(shown).extension.look.dust_color, Vec3::X);
         }
     }
 

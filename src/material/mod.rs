@@ -87,9 +87,15 @@ impl Plugin for PorousMaterialPlugin {
         app.add_plugins(MaterialPlugin::<WeatheredMaterial>::default())
             .add_plugins((clock::plugin, warm_up::plugin))
             .add_observer(exchange::release_surface)
+            .add_observer(exchange::note_removed)
             .add_systems(
                 PostUpdate,
-                (exchange::exchange_materials, exchange::follow_dry_materials, exchange::follow_surfaces)
+                (
+                    exchange::exchange_materials,
+                    exchange::follow_dry_materials,
+                    exchange::follow_surfaces,
+                    exchange::follow_matter_look,
+                )
                     .chain()
                     // The first water is drawn in the frame in which it comes.
                     .after(note_traces)

@@ -141,7 +141,9 @@ pub(super) fn measure_surfaces(
                         entity.remove::<Exposure>();
                     }
                     if water.is_none() {
-                        entity.insert(SurfaceWater::of_size(size, wrap, texel.mean_mm2));
+                        let (.., material) = past;
+                        let former = FormerMaterial(material.copied().unwrap_or_default());
+                        entity.insert((SurfaceWater::of_size(size, wrap, texel.mean_mm2), former));
                     }
                 }
                 // It may have changed in the meantime.
@@ -183,40 +185,38 @@ fn choose_units(water: &mut SurfaceWater, mean_mm2: f32) {
     }
 }
 
-/// What a surface was made of when its texels were last brought to the present for another.
+/// By what the water of a surface has been absorbed and has dried so far. Comes and goes with that water.
 #[derive(Component)]
 pub(super) struct FormerMaterial(PorousMaterial);
 
 type Remade = (
-    Entity,
     &'static mut SurfaceWater,
     &'static WetGeometry,
     Option<&'static Exposure>,
-    Ref<'static, PorousMaterial>,
-    Option<&'static mut FormerMaterial>,
+    Option<&'static PorousMaterial>,
+    &'static mut FormerMaterial,
 );
 
-/// Water of a surface that becomes other matter has been absorbed and dried, until now, as in the former.
+/// Water of a surface that becomes other matter has been absorbed and dried, until now, as in the former. Compares all of them in
+/// every frame: what was made of none, or is made of none any more, is of the default, and no change tells that.
 pub(super) fn settle_before_new_material(
-    mut commands: Commands,
     clock: Res<WeatheringClock>,
     drying: Res<DryingClock>,
-    mut surfaces: Query<Remade, Changed<PorousMaterial>>,
+    mut surfaces: Query<Remade>,
 ) {
-    for (entity, mut water, geometry, exposure, material, former) in &mut surfaces {
-        let Some(mut former) = former else {
-            commands.entity(entity).insert(FormerMaterial(*material));
+    for (mut water, geometry, exposure, material, mut former) in &mut surfaces {
+        let material = material.copied().unwrap_or_default();
+        if former.0 == material {
             continue;
-        };
-        let former = std::mem::replace(&mut former.0, *material);
-        if former != *material && water.is_wet() {
+        }
+        let former = std::mem::replace(&mut former.0, material);
+        if water.is_wet() {
             water.settle_all(&Now::new(clock.tick(), clock.hz(), &drying, &geometry.0, exposure, &former));
         }
     }
 }
 
 type Exchanged = (
-    Entity,
     &'static mut PorousMaterial,
     Option<&'static mut FormerMaterial>,
     Option<(&'static mut SurfaceWater, &'static WetGeometry, Option<&'static Exposure>)>,
@@ -228,7 +228,6 @@ type Exchanged = (
 pub(crate) struct ExchangeMatter<'w, 's> {
     clock: Res<'w, WeatheringClock>,
     drying: Res<'w, DryingClock>,
-    commands: Commands<'w, 's>,
     surfaces: Query<'w, 's, Exchanged>,
 }
 
@@ -236,7 +235,7 @@ impl ExchangeMatter<'_, '_> {
     /// The surface is of this matter from the start of the tick that is under way; until then it absorbed and dried as what
     /// it was.
     pub(crate) fn exchange(&mut self, surface: Entity, material: PorousMaterial) {
-        let Ok((entity, mut current, former, water)) = self.surfaces.get_mut(surface) else { return };
+        let Ok((mut current, former, water)) = self.surfaces.get_mut(surface) else { return };
         if let Some((mut water, geometry, exposure)) = water
             && water.is_wet()
         {
@@ -245,11 +244,8 @@ impl ExchangeMatter<'_, '_> {
             water.settle_all(&now);
         }
         *current = material;
-        match former {
-            Some(mut former) => former.0 = material,
-            None => {
-                self.commands.entity(entity).insert(FormerMaterial(material));
-            }
+        if let Some(mut former) = former {
+            former.0 = material;
         }
     }
 }
@@ -263,9 +259,14 @@ pub(crate) fn put_matter(world: &mut World, surface: Entity, material: PorousMat
 
 /// A surface without maps has no water any more. What is queued for it, and what is falling off it, stays.
 pub(super) fn release_maps(removed: On<Remove, MapSize>, mut commands: Commands) {
-    commands
-        .entity(removed.entity)
-        .try_remove::<(WetGeometry, Measured, PosedSlopes, SurfaceWater, Exposure)>();
+    commands.entity(removed.entity).try_remove::<(
+        WetGeometry,
+        Measured,
+        PosedSlopes,
+        SurfaceWater,
+        Exposure,
+        FormerMaterial,
+    )>();
 }
 
 /// A surface that is not [`Weatherable`] any more is not wet any more.

@@ -87,6 +87,31 @@ fn a_film_goes_into_brick_by_the_root_of_time_and_stays_on_glaze() {
 }
 
 #[test]
+fn a_film_on_what_becomes_of_other_matter_for_the_first_time_goes_into_it_from_then_on() {
+    let mut scene = Scene::new(60);
+    let mut covered = |x: f32| {
+        let mesh = ground(Vec2::ONE, UVec2::splat(2)).unwrap();
+        let surface = scene.surface(mesh, 16, glazed(), Transform::from_xyz(x, 0.0, 0.0));
+        let geometry = scene.0.world().get::<WetGeometry>(surface).unwrap().0.clone();
+        scene.0.world_mut().get_mut::<SurfaceWater>(surface).unwrap().cover(&geometry, 0.5, 0.0, 1);
+        surface
+    };
+    let (remade, bared) = (covered(0.0), covered(5.0));
+    scene.run(241);
+    scene.0.world_mut().entity_mut(remade).insert(brick());
+    // What is made of nothing in particular is terracotta, which soon is full.
+    scene.0.world_mut().entity_mut(bared).remove::<PorousMaterial>();
+    scene.run(1);
+    for surface in [remade, bared] {
+        let here = scene.at(surface, Vec2::splat(0.4));
+        assert!((here.absorbed_mm - 1.0 / 30.0).abs() < 1e-3, "{here:?}");
+    }
+    scene.run(59);
+    let here = scene.at(remade, Vec2::splat(0.4));
+    assert!((here.absorbed_mm - 0.2582).abs() < 1e-3, "{here:?}");
+}
+
+#[test]
 fn film_dries_before_pores_gloss_and_the_rim_before_the_middle_and_puddles_last() {
     let mut scene = Scene::new(60);
     let material =

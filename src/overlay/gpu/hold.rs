@@ -30,6 +30,7 @@ mod tests {
 
     use super::*;
     use crate::overlay::Splat;
+    use crate::schedule::{WeatheringSchedulePlugin, WeatheringTick, run_tick};
 
     #[test]
     fn ticks_are_held_while_too_much_waits_wherever_it_does() {
@@ -47,6 +48,26 @@ mod tests {
             world.resource::<SplatStats>().set_pending(pending);
             schedule.run(&mut world);
             assert_eq!(world.resource::<TickHold>().is_held, expected, "{queued} {pending}");
+        }
+    }
+
+    #[derive(Resource, Default)]
+    struct Ran(u32);
+
+    #[test]
+    fn a_pause_lasts_though_nothing_waits() {
+        let mut app = App::new();
+        app.add_plugins(WeatheringSchedulePlugin)
+            .init_resource::<SplatBudget>()
+            .init_resource::<SplatStats>()
+            .init_resource::<Ran>()
+            .add_systems(PreUpdate, hold_ticks)
+            .add_systems(WeatheringTick, |mut ran: ResMut<Ran>| ran.0 += 1);
+        for (is_paused, expected) in [(true, 0), (false, 1)] {
+            app.world_mut().resource_mut::<TickHold>().is_paused = is_paused;
+            app.world_mut().run_schedule(PreUpdate);
+            run_tick(app.world_mut());
+            assert_eq!(app.world().resource::<Ran>().0, expected);
         }
     }
 }
