@@ -7,7 +7,7 @@ use bevy::mesh::PrimitiveTopology;
 use bevy::prelude::*;
 use bevy_weathering::effect::ShippedEffect;
 use bevy_weathering::emitter::{EmitterState, NotEmitting};
-use bevy_weathering::particle::WaterCounts;
+use bevy_weathering::particle::{Particles, WaterCounts};
 use bevy_weathering::prelude::*;
 use bevy_weathering::wetting::Refusal;
 
@@ -63,6 +63,31 @@ fn rain_brings_as_much_as_it_says_and_the_floor_gets_it() {
     // Some of what is thrown up comes down beside it.
     let (got, sent) = (f64::from(over.film_ml + over.absorbed_ml), emitted(&scene));
     assert!(got > 0.85 * sent && got < 1.001 * sent, "{got} of {sent} ml");
+}
+
+/// Transforms are propagated at the end of the frame.
+#[test]
+fn an_emitter_that_comes_between_two_ticks_of_a_frame_sends_from_where_it_is() {
+    let mut scene = Scene::new(60);
+    let emitter = Emitter { effect: loaded(&mut scene, WeatherEffect::RAIN), rate: 6000.0, ..default() };
+    let first = scene.0.world_mut().spawn(emitter.clone()).id();
+    // Its effect has a row from then on.
+    scene.run(1);
+    scene.run(1);
+    let world = scene.0.world_mut();
+    world.entity_mut(first).despawn();
+    assert!(!world.resource::<Particles>().is_empty());
+    world.resource_mut::<Particles>().clear();
+
+    let at = |x: f32| Transform::from_xyz(x, 0.0, 0.0);
+    let parent = world.spawn(at(50.0)).id();
+    world.spawn((emitter, at(20.0), ChildOf(parent)));
+    world.run_schedule(WeatheringTick);
+    let particles = world.resource::<Particles>();
+    assert!(particles.len() > 50, "{}", particles.len());
+    for position in particles.positions() {
+        assert!(position.distance(Vec3::X * 70.0) < 1.0, "{position}");
+    }
 }
 
 #[test]
