@@ -5,8 +5,10 @@ use std::path::Path;
 use bevy::asset::RenderAssetUsages;
 use bevy::mesh::PrimitiveTopology;
 use bevy::prelude::*;
+use bevy_weathering::collision::TriangleError;
 use bevy_weathering::effect::ShippedEffect;
 use bevy_weathering::emitter::{EmitterState, NotEmitting};
+use bevy_weathering::overlay::MapPool;
 use bevy_weathering::particle::{Particles, WaterCounts};
 use bevy_weathering::prelude::*;
 use bevy_weathering::wetting::Refusal;
@@ -186,6 +188,40 @@ fn a_surface_without_room_for_its_maps_is_refused() {
     let told = scene.0.world().resource::<Told>();
     assert_eq!(told.refused[0], SurfaceRefused { surface: floor, reason: Refusal::NoRoom });
     assert!(told.ready.is_empty());
+}
+
+#[test]
+fn a_surface_without_a_mesh_is_refused_and_takes_no_room_until_it_has_one() {
+    let mut scene = listening();
+    let maps = Weatherable { map_size: 64, ..default() };
+    let root = scene.0.world_mut().spawn((maps, Transform::default())).id();
+    let reserved = |scene: &Scene| scene.0.world().resource::<MapPool>().reserved;
+    for _ in 0..5 {
+        scene.0.update();
+        assert_eq!(reserved(&scene), 0);
+    }
+    let refusal = SurfaceRefused { surface: root, reason: Refusal::Mesh(TriangleError::NoMesh) };
+    assert_eq!(scene.0.world().resource::<Told>().refused, [refusal]);
+
+    let mesh = Mesh3d(scene.0.world_mut().resource_mut::<Assets<Mesh>>().add(plane()));
+    scene.0.world_mut().entity_mut(root).insert(mesh);
+    scene.wait_until("a mesh", |scene| scene.0.world().resource::<Told>().ready == [root]);
+    assert!(reserved(&scene) > 0);
+    assert_eq!(scene.0.world().resource::<Told>().refused, [refusal]);
+}
+
+#[test]
+fn a_mesh_that_comes_right_after_its_surface_is_no_refusal() {
+    let mut scene = listening();
+    // It has been running for a while.
+    update_for(&mut scene, 3);
+    let maps = Weatherable { map_size: 64, ..default() };
+    let late = scene.0.world_mut().spawn((maps, Transform::default())).id();
+    scene.0.update();
+    let mesh = Mesh3d(scene.0.world_mut().resource_mut::<Assets<Mesh>>().add(plane()));
+    scene.0.world_mut().entity_mut(late).insert(mesh);
+    scene.wait_until("a mesh", |scene| scene.0.world().resource::<Told>().ready == [late]);
+    assert!(scene.0.world().resource::<Told>().refused.is_empty());
 }
 
 /// Markdown's definitions of links: label and target.
