@@ -84,6 +84,11 @@ fn splats(depth: u32) -> Vec<Splat> {
     (0..SPLATS).map(splat).collect()
 }
 
+/// A surface that has maps, and whose mesh never comes.
+fn spawn(world: &mut World) -> Entity {
+    world.spawn((SURFACE, Mesh3d::default())).id()
+}
+
 /// The library with one surface.
 struct Ours {
     app: App,
@@ -93,7 +98,7 @@ struct Ours {
 impl Ours {
     fn new() -> Self {
         let mut app = headless::app();
-        let surface = app.world_mut().spawn(SURFACE).id();
+        let surface = spawn(app.world_mut());
         Self { app, surface }
     }
 
@@ -101,7 +106,7 @@ impl Ours {
     fn renew(&mut self) {
         let world = self.app.world_mut();
         world.despawn(self.surface);
-        self.surface = world.spawn(SURFACE).id();
+        self.surface = spawn(world);
     }
 
     fn push(&mut self, splats: &[Splat]) {

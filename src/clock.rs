@@ -5,7 +5,7 @@
 
 use bevy::prelude::*;
 
-use crate::schedule::{WeatheringSystems, WeatheringTick};
+use crate::schedule::{WeatheringSystems, WeatheringTick, run_tick};
 
 /// Counts fixed ticks and tells their length. Advanced once per tick, before [`WeatheringSystems::First`].
 ///
@@ -97,7 +97,9 @@ impl ShownTime {
     }
 }
 
-/// Adds [`WeatheringClock`] and runs `FixedUpdate`, and so the ticks, at its rate.
+/// Adds [`WeatheringClock`] and runs `FixedUpdate`, and so the ticks and all else that is in there, at its rate: whatever rate
+/// Bevy's `Time<Fixed>` had before. A game that needs another gives it to this plugin. Where the two differ later on, weather goes
+/// faster or slower than the game, and a warning says so.
 pub struct ClockPlugin {
     /// Ticks per second, 1..=[`WeatheringClock::MAX_HZ`].
     pub hz: u32,
@@ -115,6 +117,8 @@ impl Plugin for ClockPlugin {
         app.register_type::<WeatheringClock>().register_type::<ShownTime>().init_resource::<ShownTime>();
         // Every stage of a tick sees its number.
         app.add_systems(WeatheringTick, advance_clock.before(WeatheringSystems::First));
+        // By the rate of the tick that is about to run.
+        app.add_systems(FixedUpdate, tell_other_rate.before(run_tick));
     }
 }
 
@@ -125,6 +129,26 @@ impl ClockPlugin {
         world.insert_resource(Time::<Fixed>::from_hz(f64::from(clock.hz())));
         world.insert_resource(clock);
     }
+}
+
+/// Ticks that take longer or shorter than they count would be weather at another speed.
+fn tell_other_rate(clock: Res<WeatheringClock>, fixed: Option<Res<Time<Fixed>>>) {
+    if let Some(fixed) = fixed
+        && is_other_rate(&clock, &fixed)
+    {
+        warn_once!(
+            "`FixedUpdate` runs every {:?}, but a tick of the weather counts as 1/{} s: set the rate by `ClockPlugin`, not by \
+             `Time<Fixed>`",
+            fixed.timestep(),
+            clock.hz()
+        );
+    }
+}
+
+/// Whether `FixedUpdate` runs at another rate than ticks are counted by.
+fn is_other_rate(clock: &WeatheringClock, fixed: &Time<Fixed>) -> bool {
+    // A time step is whole nanoseconds.
+    (fixed.timestep().as_secs_f64() * f64::from(clock.hz()) - 1.0).abs() > 1e-3
 }
 
 /// One tick on. Runs before every stage of the tick.
@@ -143,6 +167,23 @@ mod tests {
             clock.advance();
         }
         assert_eq!(clock.seconds(), 3600.0);
+    }
+
+    #[test]
+    fn the_rate_of_the_plugin_is_that_of_its_ticks_and_another_is_seen() {
+        let mut world = World::new();
+        for hz in [0, 1, 7, 60, 144, 1000, u32::MAX] {
+            ClockPlugin { hz }.insert_clock(&mut world);
+            let (clock, fixed) = (world.resource::<WeatheringClock>(), world.resource::<Time<Fixed>>());
+            assert!(!is_other_rate(clock, fixed), "{hz}");
+        }
+        let clock = WeatheringClock::new(60);
+        // Bevy's own, and those of games.
+        for fixed in
+            [Time::<Fixed>::default(), Time::<Fixed>::from_hz(30.0), Time::<Fixed>::from_seconds(0.1)]
+        {
+            assert!(is_other_rate(&clock, &fixed), "{:?}", fixed.timestep());
+        }
     }
 
     #[test]

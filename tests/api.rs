@@ -5,9 +5,11 @@ use std::path::Path;
 use bevy::asset::RenderAssetUsages;
 use bevy::mesh::PrimitiveTopology;
 use bevy::prelude::*;
+use bevy_weathering::collision::TriangleError;
 use bevy_weathering::effect::ShippedEffect;
 use bevy_weathering::emitter::{EmitterState, NotEmitting};
-use bevy_weathering::particle::WaterCounts;
+use bevy_weathering::overlay::MapPool;
+use bevy_weathering::particle::{Particles, WaterCounts};
 use bevy_weathering::prelude::*;
 use bevy_weathering::wetting::Refusal;
 
@@ -63,6 +65,31 @@ fn rain_brings_as_much_as_it_says_and_the_floor_gets_it() {
     // Some of what is thrown up comes down beside it.
     let (got, sent) = (f64::from(over.film_ml + over.absorbed_ml), emitted(&scene));
     assert!(got > 0.85 * sent && got < 1.001 * sent, "{got} of {sent} ml");
+}
+
+/// Transforms are propagated at the end of the frame.
+#[test]
+fn an_emitter_that_comes_between_two_ticks_of_a_frame_sends_from_where_it_is() {
+    let mut scene = Scene::new(60);
+    let emitter = Emitter { effect: loaded(&mut scene, WeatherEffect::RAIN), rate: 6000.0, ..default() };
+    let first = scene.0.world_mut().spawn(emitter.clone()).id();
+    // Its effect has a row from then on.
+    scene.run(1);
+    scene.run(1);
+    let world = scene.0.world_mut();
+    world.entity_mut(first).despawn();
+    assert!(!world.resource::<Particles>().is_empty());
+    world.resource_mut::<Particles>().clear();
+
+    let at = |x: f32| Transform::from_xyz(x, 0.0, 0.0);
+    let parent = world.spawn(at(50.0)).id();
+    world.spawn((emitter, at(20.0), ChildOf(parent)));
+    world.run_schedule(WeatheringTick);
+    let particles = world.resource::<Particles>();
+    assert!(particles.len() > 50, "{}", particles.len());
+    for position in particles.positions() {
+        assert!(position.distance(Vec3::X * 70.0) < 1.0, "{position}");
+    }
 }
 
 #[test]
@@ -161,6 +188,40 @@ fn a_surface_without_room_for_its_maps_is_refused() {
     let told = scene.0.world().resource::<Told>();
     assert_eq!(told.refused[0], SurfaceRefused { surface: floor, reason: Refusal::NoRoom });
     assert!(told.ready.is_empty());
+}
+
+#[test]
+fn a_surface_without_a_mesh_is_refused_and_takes_no_room_until_it_has_one() {
+    let mut scene = listening();
+    let maps = Weatherable { map_size: 64, ..default() };
+    let root = scene.0.world_mut().spawn((maps, Transform::default())).id();
+    let reserved = |scene: &Scene| scene.0.world().resource::<MapPool>().reserved;
+    for _ in 0..5 {
+        scene.0.update();
+        assert_eq!(reserved(&scene), 0);
+    }
+    let refusal = SurfaceRefused { surface: root, reason: Refusal::Mesh(TriangleError::NoMesh) };
+    assert_eq!(scene.0.world().resource::<Told>().refused, [refusal]);
+
+    let mesh = Mesh3d(scene.0.world_mut().resource_mut::<Assets<Mesh>>().add(plane()));
+    scene.0.world_mut().entity_mut(root).insert(mesh);
+    scene.wait_until("a mesh", |scene| scene.0.world().resource::<Told>().ready == [root]);
+    assert!(reserved(&scene) > 0);
+    assert_eq!(scene.0.world().resource::<Told>().refused, [refusal]);
+}
+
+#[test]
+fn a_mesh_that_comes_right_after_its_surface_is_no_refusal() {
+    let mut scene = listening();
+    // It has been running for a while.
+    update_for(&mut scene, 3);
+    let maps = Weatherable { map_size: 64, ..default() };
+    let late = scene.0.world_mut().spawn((maps, Transform::default())).id();
+    scene.0.update();
+    let mesh = Mesh3d(scene.0.world_mut().resource_mut::<Assets<Mesh>>().add(plane()));
+    scene.0.world_mut().entity_mut(late).insert(mesh);
+    scene.wait_until("a mesh", |scene| scene.0.world().resource::<Told>().ready == [late]);
+    assert!(scene.0.world().resource::<Told>().refused.is_empty());
 }
 
 /// Markdown's definitions of links: label and target.

@@ -14,7 +14,7 @@ use crate::wetting::MeasureTimer;
 #[derive(Component, Clone)]
 pub struct SurfaceCollider(pub Arc<MeshBvh>);
 
-/// Why a [`Weatherable`] entity got no collider. Reported once.
+/// Why a [`Weatherable`] entity got no collider. Reported once; gone when it shows a mesh that will do.
 #[derive(Component, Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NotWeatherable(pub TriangleError);
 
@@ -175,6 +175,25 @@ pub(super) fn attach_colliders(
             }
             None => {}
         }
+    }
+}
+
+/// Surfaces that have nothing that could be hit, which has not been told.
+type Bare = (Without<Mesh3d>, Without<SurfaceCollider>, Without<NotWeatherable>);
+
+/// Tells of surfaces that have no mesh. Those that are new may get one in the same frame.
+pub(super) fn refuse_bare(
+    mut commands: Commands,
+    bare: Query<(Entity, Ref<Weatherable>, Option<&Name>), Bare>,
+) {
+    for (entity, surface, name) in &bare {
+        if surface.is_added() {
+            continue;
+        }
+        let label = name.map_or_else(|| entity.to_string(), ToString::to_string);
+        let error = TriangleError::NoMesh;
+        error!("{label} cannot be weathered: {error}");
+        commands.entity(entity).try_insert(NotWeatherable(error));
     }
 }
 

@@ -94,6 +94,7 @@ impl Plugin for CollisionPlugin {
                     colliders::watch_meshes,
                     colliders::build_colliders,
                     colliders::attach_colliders,
+                    colliders::refuse_bare,
                     deform::attach_deforming,
                 )
                     .chain()

@@ -98,6 +98,19 @@ impl CollisionScene {
         self.cast_near(start, end, rigid, deforming)
     }
 
+    /// The closest hit on one surface, whatever lies before it.
+    pub fn cast_on(&self, surface: Entity, start: Vec3, end: Vec3) -> Option<SceneHit> {
+        let segment = Segment::new(start, end)?;
+        let is_it = |instance: &Instance| instance.surface == surface;
+        let mut closest: Option<(&Instance, LocalHit)> = None;
+        for part in [&self.rigid, &self.deforming] {
+            let within = closest.map_or(1.0, |(_, hit)| hit.fraction);
+            closest = part.cast(segment, start, end, within, is_it).or(closest);
+        }
+        let (instance, hit) = closest?;
+        Some(instance.resolve(start, end, hit))
+    }
+
     /// Lets go of the surfaces that deform, so that their shapes can change in place.
     pub(super) fn forget_deforming(&mut self) {
         self.deforming = Part::default();
@@ -109,7 +122,7 @@ impl CollisionScene {
         for (part, is_near) in [(&self.rigid, rigid), (&self.deforming, deforming)] {
             if is_near {
                 let within = closest.map_or(1.0, |(_, hit)| hit.fraction);
-                closest = part.cast(segment, start, end, within).or(closest);
+                closest = part.cast(segment, start, end, within, |_| true).or(closest);
             }
         }
         let (instance, hit) = closest?;
@@ -145,11 +158,21 @@ impl Part {
         Self { instances, top, bounds }
     }
 
-    /// The closest hit on this fraction of the segment.
-    fn cast(&self, segment: Segment, start: Vec3, end: Vec3, within: f32) -> Option<(&Instance, LocalHit)> {
+    /// The closest hit on this fraction of the segment, on those that are meant.
+    fn cast(
+        &self,
+        segment: Segment,
+        start: Vec3,
+        end: Vec3,
+        within: f32,
+        is_meant: impl Fn(&Instance) -> bool,
+    ) -> Option<(&Instance, LocalHit)> {
         let mut closest: Option<(&Instance, LocalHit)> = None;
         self.top.visit(segment, |index, fraction| {
             let instance = &self.instances[index as usize];
+            if !is_meant(instance) {
+                return None;
+            }
             let to_mesh = |point| instance.mesh_from_world.transform_point3(point);
             let segment = Segment::new(to_mesh(start), to_mesh(end))?;
             let hit = instance.shape.cast_within(segment, fraction.min(within))?;
@@ -316,6 +339,14 @@ mod tests {
         assert_eq!(cast(1.0, -1.0), Some(ids[1]));
         assert_eq!(cast(-1.0, 1.0), Some(ids[0]));
         assert_eq!(cast(0.4, 0.1), None);
+        // The one that is asked for, from either side.
+        let cast_on =
+            |id, from: f32, to: f32| scene.cast_on(id, Vec3::Y * from, Vec3::Y * to).map(|hit| hit.surface);
+        assert_eq!(cast_on(ids[0], 1.0, -1.0), Some(ids[0]));
+        assert_eq!(cast_on(ids[1], -1.0, 1.0), Some(ids[1]));
+        assert_eq!(cast_on(ids[0], 1.0, 0.1), None);
+        assert_eq!(cast_on(Entity::from_raw_u32(3).unwrap(), 1.0, -1.0), None);
+        assert_eq!(cast_on(ids[0], f32::NAN, -1.0), None);
     }
 
     #[test]

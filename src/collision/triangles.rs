@@ -38,6 +38,9 @@ pub struct TriangleReport {
 #[derive(thiserror::Error, Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TriangleError {
+    /// There is none.
+    #[error("there is no `Mesh3d` on its entity; in a glTF scene, entities below the root have one")]
+    NoMesh,
     /// Its asset could not be loaded.
     #[error("it could not be loaded")]
     NotLoaded,

@@ -11,6 +11,7 @@
 
 mod detail;
 mod emit;
+mod place;
 mod shape;
 mod silent;
 mod sky;
@@ -193,7 +194,7 @@ impl Plugin for EmitterPlugin {
             .init_resource::<NewParticles>()
             .add_systems(
                 WeatheringTick,
-                (emit_particles, spawn_particles).chain().in_set(WeatheringSystems::Emit),
+                (place::place_new, emit_particles, spawn_particles).chain().in_set(WeatheringSystems::Emit),
             )
             // When all that a frame loads and spawns is there.
             .add_systems(Last, silent::tell_silent);

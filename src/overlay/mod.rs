@@ -59,8 +59,8 @@ pub use tiles::{TILE_SIZE, TileBins, TileHeader};
 
 /// Makes a mesh entity weatherable: it can be hit, and shows what hit it.
 ///
-/// Needs a mesh with texture coordinates, or one that can be unwrapped ([`OverlayUv`]). Where a `StandardMaterial` is on the
-/// entity, it is exchanged for its weathered form with the same settings.
+/// Goes on the entity that has the `Mesh3d`, and needs a mesh with texture coordinates, or one that can be unwrapped
+/// ([`OverlayUv`]). Where a `StandardMaterial` is on the entity, it is exchanged for its weathered form with the same settings.
 #[derive(Component, Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq)]
 #[reflect(Component)]
 #[serde(deny_unknown_fields, default)]

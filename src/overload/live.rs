@@ -75,8 +75,9 @@ struct BeforeTick {
 }
 
 /// Measures ticks, and keeps them within a [`LiveBudget`]: by fewer particles, through [`EmissionDetail`], and by slower time,
-/// through the `max_delta` of Bevy's virtual time. Add it after [`WeatheringPlugins`](crate::WeatheringPlugins) where a window
-/// is; runs are no longer the same to the bit then, unless the machine copes.
+/// through the `max_delta` of Bevy's virtual time, which it sets in each frame: all that goes by that time slows down, too. Add it
+/// after [`WeatheringPlugins`](crate::WeatheringPlugins) where a window is; runs are no longer the same to the bit then, unless the
+/// machine copes.
 pub struct LiveBudgetPlugin;
 
 impl Plugin for LiveBudgetPlugin {

@@ -102,7 +102,8 @@ impl Default for Forces {
     }
 }
 
-/// What has happened to all particles so far. `emitted == alive + hit + expired` after every tick.
+/// What has happened to all particles so far. `emitted == alive + hit + expired` after every tick, of whatever you put into
+/// [`Particles`], too: each tick counts what is there.
 #[derive(Resource, Reflect, Serialize, Deserialize, Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[reflect(Resource)]
 pub struct ParticleCounts {
@@ -112,7 +113,7 @@ pub struct ParticleCounts {
     pub alive: u64,
     /// Particles that hit a surface.
     pub hit: u64,
-    /// Particles whose lifetime ran out.
+    /// Particles whose lifetime ran out, or that were taken out ([`Particles::clear`]).
     pub expired: u64,
     /// Particles of emitters without a [`Flow`](crate::emitter::Flow) that were not spawned, for want of room
     /// ([`ParticleConfig::max_alive`]) or detail ([`EmissionDetail`](crate::emitter::EmissionDetail)); not part of `emitted`.
@@ -124,7 +125,7 @@ pub struct ParticleCounts {
 }
 
 /// The water of all particles so far, nanolitres. `emitted` and what surfaces dripped is what they received, what expired,
-/// and what is still in flight.
+/// and what is still in flight, as long as nobody else adds or takes out [`Particles`].
 #[derive(Resource, Serialize, Deserialize, Debug, Default, Clone, PartialEq, Eq)]
 pub struct WaterCounts {
     /// Sent out by emitters.

@@ -141,7 +141,9 @@ impl Particles {
         self.newborn
     }
 
-    /// Adds what is born in this tick.
+    /// Adds what is born in this tick. Those that are pushed into [`NewParticles`](crate::emitter::NewParticles) instead get numbers
+    /// that nobody else has. [`ParticleCounts`](super::ParticleCounts) follow when the dead are retired;
+    /// [`WaterCounts`](super::WaterCounts) know nothing of it.
     pub fn spawn(&mut self, born: impl ExactSizeIterator<Item = Particle>) {
         let count = born.len();
         self.positions.reserve(count);
@@ -195,7 +197,8 @@ impl Particles {
         }
     }
 
-    /// Takes out all.
+    /// Takes out all. They count as expired in [`ParticleCounts`](super::ParticleCounts) as soon as the dead of a tick are retired;
+    /// [`WaterCounts`](super::WaterCounts) know nothing of it.
     pub fn clear(&mut self) {
         *self = Self::default();
     }

@@ -75,8 +75,8 @@ impl WetnessQuery<'_, '_> {
         self.of_texel(surface, y * water.size() + x)
     }
 
-    /// How wet a surface is where it is nearest to a point in world space; `None` if that is farther than
-    /// [`Self::REACH`].
+    /// How wet a surface is where it is nearest to a point in world space, whatever else lies there; `None` if that is farther
+    /// than [`Self::REACH`].
     pub fn at_point(&self, surface: Entity, point: Vec3) -> Option<Wetness> {
         let mut nearest: Option<(f32, Vec2)> = None;
         for direction in DIRECTIONS {
@@ -84,9 +84,7 @@ impl WetnessQuery<'_, '_> {
             // Through the point from both sides: it may lie on the surface, or behind it.
             for (start, end) in [(point - reach * 0.02, point + reach), (point + reach * 0.02, point - reach)]
             {
-                let Some(hit) = self.scene.cast(start, end).filter(|hit| hit.surface == surface) else {
-                    continue;
-                };
+                let Some(hit) = self.scene.cast_on(surface, start, end) else { continue };
                 let distance = hit.point.distance_squared(point);
                 if nearest.is_none_or(|(least, _)| distance < least) {
                     nearest = Some((distance, hit.uv));

@@ -27,7 +27,7 @@ pub struct SurfaceRefused {
 #[derive(thiserror::Error, Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// Nothing of its mesh can be hit; as in [`NotWeatherable`]. Until it shows another one.
+    /// It has no mesh, or nothing of it can be hit; as in [`NotWeatherable`]. Until it shows another one.
     #[error("its mesh cannot be weathered: {0}")]
     Mesh(TriangleError),
     /// The [`MapBudget`](crate::overlay::MapBudget) has no room for its maps; as in [`Unmapped::Refused`]. Until there is.

@@ -44,7 +44,8 @@ pub(super) fn random_splats(count: u32, seed: u64) -> Vec<Splat> {
 }
 
 pub(super) fn spawn_surface(app: &mut App, surface: Weatherable) -> Entity {
-    app.world_mut().spawn(surface).id()
+    // Who has no mesh gets no maps. This one never comes.
+    app.world_mut().spawn((surface, Mesh3d::default())).id()
 }
 
 pub(super) fn push(app: &mut App, entity: Entity, splats: &[Splat]) {

@@ -331,6 +331,22 @@ fn games_can_ask_and_are_told() {
     assert_eq!(told(&mut scene), (0, 1));
 }
 
+#[test]
+fn a_floor_can_be_asked_below_a_rug() {
+    let mut scene = Scene::new(60);
+    let mesh = |side: f32| ground(Vec2::splat(side), UVec2::splat(2)).unwrap();
+    let floor = scene.surface(mesh(1.0), 16, glazed(), Transform::default());
+    let rug = scene.surface(mesh(2.0), 16, glazed(), Transform::from_xyz(0.0, 0.05, 0.0));
+    let geometry = scene.0.world().get::<WetGeometry>(floor).unwrap().0.clone();
+    scene.0.world_mut().get_mut::<SurfaceWater>(floor).unwrap().cover(&geometry, 0.5, 0.0, 1);
+    scene.run(1);
+    let point = Vec3::new(0.0, 0.1, 0.0);
+    let ask = move |query: WetnessQuery| [floor, rug].map(|surface| query.at_point(surface, point));
+    let [floor, rug] = scene.0.world_mut().run_system_once_with_nothing(ask);
+    assert!(floor.is_some_and(|here| (here.film_mm - 0.5).abs() < 1e-3), "{floor:?}");
+    assert!(rug.is_some_and(|here| here.film_mm == 0.0), "{rug:?}");
+}
+
 /// A slope of 20 degrees that ends in a wall below it: two islands of uv, turned against each other, with one edge in
 /// common.
 fn slope_and_wall() -> Mesh {

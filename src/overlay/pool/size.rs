@@ -52,7 +52,7 @@ impl Falling {
 type Found = (
     (Entity, &'static Weatherable, &'static SurfaceOrder, &'static SurfaceTotals),
     (Option<&'static MapSize>, Has<Unmapped>, Option<&'static Resizing>),
-    (Option<&'static SurfaceCollider>, Option<&'static GlobalTransform>, Has<Mesh3d>, Has<DeformingCollider>),
+    (Option<&'static SurfaceCollider>, Option<&'static GlobalTransform>, Has<DeformingCollider>),
     (Has<WetGeometry>, Has<SurfaceWater>, Has<SurfaceFrames>, Option<&'static TexelArea>),
 );
 
@@ -61,7 +61,7 @@ type Found = (
 struct Waiting {
     entity: Entity,
     wish: Wish,
-    /// Its shape is there, or none will come.
+    /// Its shape is there.
     has_shape: bool,
     /// It had to go without before.
     again: bool,
@@ -84,12 +84,15 @@ pub(super) struct Sizing<'w, 's> {
     evicted: MessageWriter<'w, SurfaceEvicted>,
     resized: MessageWriter<'w, SurfaceResized>,
     release: Release<'w, 's>,
-    surfaces: Query<'w, 's, Found, Without<NotWeatherable>>,
+    surfaces: Query<'w, 's, Found, (Without<NotWeatherable>, Shaped)>,
     names: Query<'w, 's, &'static Name>,
 }
 
+/// Surfaces that have a shape, or will have one. Nothing falls on others.
+type Shaped = Or<(With<Mesh3d>, With<SurfaceCollider>)>;
+
 /// Surfaces about which nothing has been decided.
-type New = (With<Weatherable>, Without<MapSize>, Without<Unmapped>, Without<NotWeatherable>);
+type New = (With<Weatherable>, Without<MapSize>, Without<Unmapped>, Without<NotWeatherable>, Shaped);
 
 /// Decides about surfaces that are new, were edited, go without or have less than they wish for. Does nothing while there are none.
 pub(super) fn size_surfaces(
@@ -139,7 +142,7 @@ impl Sizing<'_, '_> {
         for (
             (entity, surface, order, totals),
             (size, again, resizing),
-            (collider, transform, has_mesh, is_posed),
+            (collider, transform, is_posed),
             (has_geometry, has_water, _, area),
         ) in &self.surfaces
         {
@@ -171,7 +174,7 @@ impl Sizing<'_, '_> {
                 }
             }
             let wish = Wish { order: order.0, limit: surface.texels(), extent: 0.0, need };
-            waiting.push(Waiting { entity, wish, has_shape: collider.is_some() || !has_mesh, again });
+            waiting.push(Waiting { entity, wish, has_shape: collider.is_some(), again });
         }
         (mapped, waiting)
     }
