@@ -26,7 +26,8 @@ use crate::schedule::{WeatheringSystems, WeatheringTick};
 
 pub use detail::EmissionDetail;
 pub use emit::NewParticles;
-use emit::{emit_particles, spawn_particles};
+use emit::emit_particles;
+pub(crate) use emit::spawn_particles;
 pub use silent::NotEmitting;
 pub use sources::{Source, TrackSources};
 pub use state::EmitterState;
@@ -178,7 +179,7 @@ pub enum EmitterShape {
 #[reflect(Resource)]
 pub struct EmissionSeed(pub u64);
 
-/// Spawns the particles of all [`Emitter`]s.
+/// Lets all [`Emitter`]s write the particles that they owe.
 pub struct EmitterPlugin;
 
 impl Plugin for EmitterPlugin {
@@ -193,7 +194,8 @@ impl Plugin for EmitterPlugin {
             .init_resource::<NewParticles>()
             .add_systems(
                 WeatheringTick,
-                (emit_particles, spawn_particles).chain().in_set(WeatheringSystems::Emit),
+                // What is owed in a tick is born in it.
+                emit_particles.before(spawn_particles).in_set(WeatheringSystems::Emit),
             )
             // When all that a frame loads and spawns is there.
             .add_systems(Last, silent::tell_silent);

@@ -86,6 +86,7 @@ impl Plugin for LiveBudgetPlugin {
             .init_resource::<LiveBudget>()
             .init_resource::<LiveLoad>()
             .init_resource::<BeforeTick>()
+            .init_resource::<EmissionDetail>()
             // Limits the time that is about to be measured.
             .add_systems(First, pace.before(TimeSystems))
             // Around the whole tick, and nothing else.

@@ -25,6 +25,7 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::EffectIndex;
+use crate::emitter::{NewParticles, spawn_particles};
 use crate::schedule::{RetireSystems, WeatheringSystems, WeatheringTick};
 use crate::weather::Weather;
 
@@ -159,7 +160,7 @@ impl Default for ParticleConfig {
     }
 }
 
-/// Moves and retires particles.
+/// Spawns, moves and retires particles, whoever made them.
 pub struct ParticlePlugin;
 
 impl Plugin for ParticlePlugin {
@@ -173,9 +174,11 @@ impl Plugin for ParticlePlugin {
             .init_resource::<ParticleCounts>()
             .init_resource::<WaterCounts>()
             .init_resource::<Particles>()
+            .init_resource::<NewParticles>()
             .add_systems(
                 WeatheringTick,
                 (
+                    spawn_particles.in_set(WeatheringSystems::Emit),
                     integrate_particles.in_set(WeatheringSystems::Integrate),
                     retire_particles.in_set(RetireSystems),
                 ),
