@@ -65,7 +65,7 @@ impl Plugin for WeatheringSchedulePlugin {
 /// Lets ticks be left out. Weather time stands still then, whatever Bevy's fixed time does: nothing is emitted, nothing dries and
 /// nothing is lost.
 #[derive(Resource, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct TickHold {
     /// Whether the next tick is left out. Set by those who cannot keep up: so that maps are painted whole,
     /// [`GpuOverlayPlugin`](crate::overlay::GpuOverlayPlugin).

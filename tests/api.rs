@@ -1,11 +1,13 @@
 //! The library as a Bevy app meets it: what is built in, what is told, where its documentation leads.
 
+use std::any::TypeId;
 use std::path::Path;
 
 use bevy::app::PluginGroupBuilder;
 use bevy::asset::{AssetPlugin, RenderAssetUsages};
 use bevy::mesh::PrimitiveTopology;
 use bevy::prelude::*;
+use bevy::reflect::serde::TypedReflectDeserializer;
 use bevy::time::TimeUpdateStrategy;
 use bevy_weathering::brush::BrushPlugin;
 use bevy_weathering::effect::ShippedEffect;
@@ -20,6 +22,7 @@ use bevy_weathering::unwrap::UnwrapPlugin;
 use bevy_weathering::weather::WeatherPlugin;
 use bevy_weathering::wetting::gpu::WaterUploadPlugin;
 use bevy_weathering::wetting::{DripEffect, Refusal, SurfaceWater, WettingPlugin};
+use serde::de::DeserializeSeed;
 
 use crate::gpu::app::{bare_app, update, update_until};
 use crate::wetting::scene::Scene;
@@ -172,6 +175,55 @@ fn a_surface_without_room_for_its_maps_is_refused() {
     let told = scene.0.world().resource::<Told>();
     assert_eq!(told.refused[0], SurfaceRefused { surface: floor, reason: Refusal::NoRoom });
     assert!(told.ready.is_empty());
+}
+
+/// Inspectors, scene files and remote protocols begin with the default, and set what they are told.
+#[test]
+fn what_can_be_reflected_has_a_default_or_is_nothing_without_its_values() {
+    const WITHOUT: [&str; 24] = [
+        // What the library tells, or notes on entities.
+        "BecameWet",
+        "Dried",
+        "DryMaterial",
+        "Impact",
+        "MapSize",
+        "NotEmitting",
+        "Overlays",
+        "SurfaceEvicted",
+        "SurfaceImpact",
+        "SurfaceReady",
+        "SurfaceResized",
+        "Understudy",
+        "Unmapped",
+        // What particles and shaders are made of.
+        "EffectIndex",
+        "Lifespan",
+        "ModelKind",
+        "PorousExtension",
+        "PorousKey",
+        "Sequence",
+        // None of their kinds is more usual than another.
+        "Brush",
+        "BrushKind",
+        "MatterKind",
+        "StampKind",
+        "Stroke",
+    ];
+    let scene = Scene::new(60);
+    let registry = scene.0.world().resource::<AppTypeRegistry>().read();
+    let lacking: Vec<&str> = registry
+        .iter()
+        .filter(|registration| !registration.contains::<ReflectDefault>())
+        .map(|registration| registration.type_info().type_path())
+        .filter(|path| path.starts_with("bevy_weathering::"))
+        .filter(|path| path.rsplit("::").next().is_some_and(|name| !WITHOUT.contains(&name)))
+        .collect();
+    assert!(lacking.is_empty(), "{lacking:?}");
+
+    let registration = registry.get(TypeId::of::<Weatherable>()).unwrap();
+    let mut json = serde_json::Deserializer::from_str(r#"{"map_size": 256}"#);
+    let told = TypedReflectDeserializer::new(registration, &registry).deserialize(&mut json).unwrap();
+    assert_eq!(Weatherable::from_reflect(&*told), Some(Weatherable { map_size: 256, ..default() }));
 }
 
 /// Everything but one part.

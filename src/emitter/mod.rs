@@ -34,7 +34,7 @@ pub use state::EmitterState;
 
 /// Sends out particles of one effect. Configuration only; see [`EmitterState`] for what it has done.
 #[derive(Component, Reflect, Debug, Clone)]
-#[reflect(Component)]
+#[reflect(Component, Default)]
 #[require(Transform, EmitterState)]
 pub struct Emitter {
     /// What it sends out. Nothing is emitted (nor owed) before the asset is loaded; if it cannot be, the log and
@@ -79,6 +79,7 @@ impl Default for Emitter {
 
 /// How much an emitter sends out.
 #[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Default)]
+#[reflect(Default)]
 pub enum Flow {
     /// Each particle what its effect says.
     #[default]
@@ -144,6 +145,7 @@ pub fn nozzle_speed(litres_per_minute: f32, radius: f32) -> f32 {
 
 /// Where on an emitter particles start. Lengths in metres, in the emitter's space; forward is -Z.
 #[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Default)]
+#[reflect(Default)]
 pub enum EmitterShape {
     /// All from the origin.
     #[default]
@@ -176,7 +178,7 @@ pub enum EmitterShape {
 
 /// Seeds every emitter's random stream. Changing it does not reseed streams already begun.
 #[derive(Resource, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct EmissionSeed(pub u64);
 
 /// Lets all [`Emitter`]s write the particles that they owe.

@@ -91,7 +91,7 @@ pub(crate) fn swept_seconds(seconds_moved: f32) -> f32 {
 
 /// Gravity, the same everywhere. The wind is the [`Weather`]'s.
 #[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct Forces {
     /// m/s².
     pub gravity: Vec3,
@@ -105,7 +105,7 @@ impl Default for Forces {
 
 /// What has happened to all particles so far. `emitted == alive + hit + expired` after every tick.
 #[derive(Resource, Reflect, Serialize, Deserialize, Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct ParticleCounts {
     /// Particles spawned.
     pub emitted: u64,
@@ -146,7 +146,7 @@ impl WaterCounts {
 
 /// Limits on particles.
 #[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct ParticleConfig {
     /// The most particles that may be in flight. What emitters would add beyond it is cut from all alike, and counted as
     /// [refused](ParticleCounts::refused) or [merged](ParticleCounts::merged). Drips always fall: emitters make room for
