@@ -13,7 +13,7 @@ use crate::schedule::{WeatheringSystems, WeatheringTick, run_tick};
 ///
 /// [`WeatheringSystems::First`]: crate::schedule::WeatheringSystems::First
 #[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct WeatheringClock {
     tick: u32,
     hz: u32,
@@ -77,7 +77,7 @@ impl WeatheringClock {
 ///
 /// Before the last event of a texel, it is shown dry: maps remember the last event, not all of them.
 #[derive(Resource, Reflect, Debug, Default, Clone, Copy, PartialEq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub enum ShownTime {
     /// The present.
     #[default]

@@ -67,30 +67,31 @@ pub mod prelude {
     pub use crate::wetting::{BecameWet, Dried, SurfaceReady, SurfaceRefused, WatchWetness, WetnessQuery};
 }
 
-/// Everything: particles, collision, splats, wet materials. Each part can be left out or replaced.
+/// Everything: particles, collision, splats, wet materials. Each part can be [set](PluginGroup::set), and those with a word in the
+/// last column can be [left out](PluginGroupBuilder::disable); the others need each other.
 ///
-/// | plugin | does | needs a render app |
-/// |---|---|---|
-/// | [`WeatheringSchedulePlugin`](schedule::WeatheringSchedulePlugin) | orders the sets of a tick | no |
-/// | [`ClockPlugin`](clock::ClockPlugin) | counts ticks | no |
-/// | [`WeatherPlugin`](weather::WeatherPlugin) | how warm, dry, windy and sunny it is | no |
-/// | [`EffectPlugin`](effect::EffectPlugin) | loads what falls | no |
-/// | [`EmitterPlugin`](emitter::EmitterPlugin) | spawns particles | no |
-/// | [`ParticlePlugin`](particle::ParticlePlugin) | moves and retires them | no |
-/// | [`UnwrapPlugin`](unwrap::UnwrapPlugin) | gives meshes whose uvs overlap unique ones | no |
-/// | [`CollisionPlugin`](collision::CollisionPlugin) | finds what they hit | no |
-/// | [`DepositPlugin`](overlay::DepositPlugin) | turns impacts into splats | no |
-/// | [`MatterPlugin`](matter::MatterPlugin) | gives surfaces room for dust, mud and snow | no |
-/// | [`WettingPlugin`](wetting::WettingPlugin) | absorbs, moves and dries water | no |
-/// | [`BrushPlugin`](brush::BrushPlugin) | wets, dries, dirties and cleans by hand | no |
-/// | [`OverloadDiagnosticsPlugin`](overload::OverloadDiagnosticsPlugin) | counts what was held back | no |
-/// | [`GpuOverlayPlugin`](overlay::GpuOverlayPlugin) | paints splats into maps | yes |
-/// | [`WaterUploadPlugin`](wetting::gpu::WaterUploadPlugin) | sends water to be drawn | yes |
-/// | [`ParticleDrawPlugin`](particle::ParticleDrawPlugin) | draws particles in flight | yes |
-/// | [`PorousMaterialPlugin`](material::PorousMaterialPlugin) | draws wet surfaces | yes |
+/// | plugin | does | needs a render app | without it |
+/// |---|---|---|---|
+/// | [`WeatheringSchedulePlugin`](schedule::WeatheringSchedulePlugin) | orders the sets of a tick | no | |
+/// | [`ClockPlugin`](clock::ClockPlugin) | counts ticks | no | |
+/// | [`WeatherPlugin`](weather::WeatherPlugin) | how warm, dry, windy and sunny it is | no | nothing dries |
+/// | [`EffectPlugin`](effect::EffectPlugin) | loads what falls | no | |
+/// | [`EmitterPlugin`](emitter::EmitterPlugin) | sends particles out | no | only what drips, is thrown up, or is made by others falls |
+/// | [`ParticlePlugin`](particle::ParticlePlugin) | spawns, moves and retires them | no | |
+/// | [`UnwrapPlugin`](unwrap::UnwrapPlugin) | gives meshes whose uvs overlap unique ones | no | surfaces have the uvs of their meshes |
+/// | [`CollisionPlugin`](collision::CollisionPlugin) | finds what they hit | no | |
+/// | [`DepositPlugin`](overlay::DepositPlugin) | turns impacts into splats | no | |
+/// | [`MatterPlugin`](matter::MatterPlugin) | lets dust, mud and snow look as you say | no | they look as they do by default |
+/// | [`WettingPlugin`](wetting::WettingPlugin) | absorbs, moves and dries water, and what it meets | no | only marks in colour stay |
+/// | [`BrushPlugin`](brush::BrushPlugin) | wets, dries, dirties and cleans by hand | no | there is no [`BrushQueue`](brush::BrushQueue) |
+/// | [`OverloadDiagnosticsPlugin`](overload::OverloadDiagnosticsPlugin) | counts what was held back | no | there are no diagnostics |
+/// | [`GpuOverlayPlugin`](overlay::GpuOverlayPlugin) | paints splats into maps | yes | put [`CpuOverlayPlugin`](overlay::CpuOverlayPlugin) in its place |
+/// | [`WaterUploadPlugin`](wetting::gpu::WaterUploadPlugin) | sends water to be drawn | yes | water is not seen |
+/// | [`ParticleDrawPlugin`](particle::ParticleDrawPlugin) | draws particles in flight | yes | they are not seen |
+/// | [`PorousMaterialPlugin`](material::PorousMaterialPlugin) | draws wet surfaces | yes | surfaces look dry and clean |
 ///
 /// Without a render app the last four do nothing; add [`CpuOverlayPlugin`](overlay::CpuOverlayPlugin) to have colour maps,
-/// too.
+/// too. [Scenarios](scenario) and [replays](replay) need all that needs no render app.
 pub struct WeatheringPlugins;
 
 impl PluginGroup for WeatheringPlugins {

@@ -65,7 +65,7 @@ impl Plugin for WeatheringSchedulePlugin {
 /// Lets ticks be left out. Weather time stands still then, whatever Bevy's fixed time does: nothing is emitted, nothing dries and
 /// nothing is lost.
 #[derive(Resource, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct TickHold {
     /// Whether ticks are left out until you say otherwise. Yours alone: nobody else sets it.
     pub is_paused: bool,

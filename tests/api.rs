@@ -1,18 +1,31 @@
 //! The library as a Bevy app meets it: what is built in, what is told, where its documentation leads.
 
+use std::any::TypeId;
 use std::path::Path;
 
-use bevy::asset::RenderAssetUsages;
+use bevy::app::PluginGroupBuilder;
+use bevy::asset::{AssetPlugin, RenderAssetUsages};
 use bevy::mesh::PrimitiveTopology;
 use bevy::prelude::*;
+use bevy::reflect::serde::TypedReflectDeserializer;
+use bevy::time::TimeUpdateStrategy;
+use bevy_weathering::brush::BrushPlugin;
 use bevy_weathering::collision::TriangleError;
 use bevy_weathering::effect::ShippedEffect;
-use bevy_weathering::emitter::{EmitterState, NotEmitting};
-use bevy_weathering::overlay::MapPool;
-use bevy_weathering::particle::{Particles, WaterCounts};
+use bevy_weathering::emitter::{EmitterPlugin, EmitterState, NewParticles, NotEmitting};
+use bevy_weathering::material::{DryMaterial, PorousMaterialPlugin};
+use bevy_weathering::matter::{MatterPlugin, MatterQueue};
+use bevy_weathering::overlay::{MapPool, Overlays, SurfaceTotals, TexelArea};
+use bevy_weathering::overload::OverloadDiagnosticsPlugin;
+use bevy_weathering::particle::{Lifespan, Particle, ParticleDrawPlugin, Particles, WaterCounts};
 use bevy_weathering::prelude::*;
-use bevy_weathering::wetting::Refusal;
+use bevy_weathering::unwrap::UnwrapPlugin;
+use bevy_weathering::weather::WeatherPlugin;
+use bevy_weathering::wetting::gpu::WaterUploadPlugin;
+use bevy_weathering::wetting::{DripEffect, Refusal, SurfaceWater, WettingPlugin};
+use serde::de::DeserializeSeed;
 
+use crate::gpu::app::{bare_app, update, update_until};
 use crate::wetting::scene::Scene;
 
 fn update_for(scene: &mut Scene, frames: u32) {
@@ -222,6 +235,149 @@ fn a_mesh_that_comes_right_after_its_surface_is_no_refusal() {
     scene.0.world_mut().entity_mut(late).insert(mesh);
     scene.wait_until("a mesh", |scene| scene.0.world().resource::<Told>().ready == [late]);
     assert!(scene.0.world().resource::<Told>().refused.is_empty());
+}
+
+/// Inspectors, scene files and remote protocols begin with the default, and set what they are told.
+#[test]
+fn what_can_be_reflected_has_a_default_or_is_nothing_without_its_values() {
+    const WITHOUT: [&str; 24] = [
+        // What the library tells, or notes on entities.
+        "BecameWet",
+        "Dried",
+        "DryMaterial",
+        "Impact",
+        "MapSize",
+        "NotEmitting",
+        "Overlays",
+        "SurfaceEvicted",
+        "SurfaceImpact",
+        "SurfaceReady",
+        "SurfaceResized",
+        "Understudy",
+        "Unmapped",
+        // What particles and shaders are made of.
+        "EffectIndex",
+        "Lifespan",
+        "ModelKind",
+        "PorousExtension",
+        "PorousKey",
+        "Sequence",
+        // None of their kinds is more usual than another.
+        "Brush",
+        "BrushKind",
+        "MatterKind",
+        "StampKind",
+        "Stroke",
+    ];
+    let scene = Scene::new(60);
+    let registry = scene.0.world().resource::<AppTypeRegistry>().read();
+    let lacking: Vec<&str> = registry
+        .iter()
+        .filter(|registration| !registration.contains::<ReflectDefault>())
+        .map(|registration| registration.type_info().type_path())
+        .filter(|path| path.starts_with("bevy_weathering::"))
+        .filter(|path| path.rsplit("::").next().is_some_and(|name| !WITHOUT.contains(&name)))
+        .collect();
+    assert!(lacking.is_empty(), "{lacking:?}");
+
+    let registration = registry.get(TypeId::of::<Weatherable>()).unwrap();
+    let mut json = serde_json::Deserializer::from_str(r#"{"map_size": 256}"#);
+    let told = TypedReflectDeserializer::new(registration, &registry).deserialize(&mut json).unwrap();
+    assert_eq!(Weatherable::from_reflect(&*told), Some(Weatherable { map_size: 256, ..default() }));
+}
+
+/// Everything but one part.
+fn all_but<P: Plugin>() -> PluginGroupBuilder {
+    WeatheringPlugins.build().disable::<P>()
+}
+
+/// A drop that nobody emits, 10 cm above the origin.
+fn let_fall(scene: &mut Scene) {
+    let effect = scene.0.world().resource::<DripEffect>().rows.unwrap()[0];
+    scene.0.world_mut().resource_mut::<NewParticles>().push(|sequence| Particle {
+        position: Vec3::Y * 0.1,
+        velocity: Vec3::NEG_Y,
+        lifespan: Lifespan { ticks_left: 60, born_at: 0 },
+        volume_nl: 25_000,
+        sequence,
+        effect,
+        class: 0,
+    });
+}
+
+#[test]
+fn what_can_be_left_out_leaves_surfaces_that_get_wet() {
+    for (without, parts) in [
+        ("weather", all_but::<WeatherPlugin>()),
+        ("emitters", all_but::<EmitterPlugin>()),
+        ("unwrapping", all_but::<UnwrapPlugin>()),
+        ("matter", all_but::<MatterPlugin>()),
+        ("brushes", all_but::<BrushPlugin>()),
+        ("diagnostics", all_but::<OverloadDiagnosticsPlugin>()),
+    ] {
+        let mut scene = Scene::with_parts(parts, AssetPlugin::default());
+        let floor = scene.surface(plane(), 64, PorousMaterial::SAND, Transform::IDENTITY);
+        scene.pour(floor, Vec2::splat(0.25), 8, 40_000_000);
+        let_fall(&mut scene);
+        scene.run(60);
+        let over = scene.over(floor);
+        assert!(over.film_ml + over.absorbed_ml > 35.0, "without {without}: {over:?}");
+        assert!(scene.0.world().get::<SurfaceTotals>(floor).unwrap().impacts > 0, "without {without}");
+        assert!(scene.0.world().resource::<Particles>().is_empty(), "without {without}");
+    }
+}
+
+#[test]
+fn without_water_nothing_waits_for_it() {
+    let mut scene = Scene::with_parts(all_but::<WettingPlugin>(), AssetPlugin::default());
+    let floor = spawn(&mut scene, plane());
+    scene.wait_for::<TexelArea>(floor);
+    let dust = loaded(&mut scene, WeatherEffect::DUST);
+    let sky = Emitter::dust(dust, 10.0, Vec2::splat(0.5));
+    scene.0.world_mut().spawn((sky, Transform::from_xyz(0.0, 0.2, 0.0)));
+    scene.run(1);
+    scene.run(300);
+    let queued = scene.0.world().get::<MatterQueue>(floor).map_or(0, |queue| queue.0.len());
+    assert!(scene.0.world().get::<SurfaceTotals>(floor).unwrap().impacts > 0);
+    assert_eq!(queued, 0);
+}
+
+#[test]
+fn what_can_be_left_out_is_not_needed_for_drawing() {
+    let bare = WeatheringPlugins
+        .build()
+        .disable::<WeatherPlugin>()
+        .disable::<EmitterPlugin>()
+        .disable::<UnwrapPlugin>()
+        .disable::<MatterPlugin>()
+        .disable::<BrushPlugin>()
+        .disable::<OverloadDiagnosticsPlugin>();
+    for (parts, is_exchanged) in [
+        (bare, true),
+        (all_but::<WettingPlugin>(), true),
+        (all_but::<WaterUploadPlugin>(), true),
+        (all_but::<ParticleDrawPlugin>(), true),
+        (all_but::<PorousMaterialPlugin>(), false),
+    ] {
+        let Some(mut app) = bare_app() else { return };
+        app.add_plugins(parts).insert_resource(TimeUpdateStrategy::FixedTimesteps(1));
+        app.finish();
+        app.cleanup();
+        let world = app.world_mut();
+        let material = world.resource_mut::<Assets<StandardMaterial>>().add(Color::WHITE);
+        let mesh = world.resource_mut::<Assets<Mesh>>().add(plane());
+        let maps = Weatherable { map_size: 64, ..default() };
+        let surface = world.spawn((Mesh3d(mesh), MeshMaterial3d(material), maps)).id();
+        update_until(&mut app, "its maps", |world| {
+            let is_wettable = world.get::<SurfaceWater>(surface).is_some();
+            world.get::<Overlays>(surface).is_some()
+                && (is_wettable || !world.contains_resource::<DripEffect>())
+        });
+        for _ in 0..3 {
+            update(&mut app);
+        }
+        assert_eq!(app.world().get::<DryMaterial>(surface).is_some(), is_exchanged);
+    }
 }
 
 /// Markdown's definitions of links: label and target.

@@ -22,6 +22,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::material::OutOfRange;
 use crate::schedule::{WeatheringSystems, WeatheringTick};
+use crate::weather::{DryingClock, Weather};
 
 pub use paint::{BrushSurfaces, paint_strokes};
 
@@ -103,14 +104,15 @@ pub struct Stroke {
 #[derive(Resource, Debug, Default)]
 pub struct BrushQueue(pub Vec<Stroke>);
 
-/// Paints the strokes of the [`BrushQueue`]. Needs [`WettingPlugin`](crate::wetting::WettingPlugin) and
-/// [`MatterPlugin`](crate::matter::MatterPlugin).
+/// Paints the strokes of the [`BrushQueue`] on the surfaces of [`WettingPlugin`](crate::wetting::WettingPlugin).
 pub struct BrushPlugin;
 
 impl Plugin for BrushPlugin {
     fn build(&self, app: &mut App) {
         app.register_type::<Brush>()
             .init_resource::<BrushQueue>()
+            .init_resource::<DryingClock>()
+            .init_resource::<Weather>()
             .add_systems(WeatheringTick, paint_strokes.in_set(WeatheringSystems::First));
     }
 }

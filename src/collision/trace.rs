@@ -14,7 +14,7 @@ const PARALLEL_BATCH: usize = 1024;
 
 /// Asks for a [`SurfaceImpact`] message for each particle that hits this surface.
 #[derive(Component, Reflect, Debug, Default, Clone, Copy)]
-#[reflect(Component)]
+#[reflect(Component, Default)]
 pub struct ReportImpacts;
 
 /// A particle hit a surface that has [`ReportImpacts`].

@@ -6,7 +6,7 @@ use bevy::prelude::*;
 /// The texture coordinates of a surface's mesh over which its maps lie. Set by [`unwrap`](crate::unwrap), for surfaces that
 /// want others than the first; a surface without it has the first.
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[reflect(Component)]
+#[reflect(Component, Default)]
 pub enum UvSet {
     /// [`Mesh::ATTRIBUTE_UV_0`].
     #[default]

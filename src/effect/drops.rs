@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 /// How large the drops are that particles of an effect stand for.
 #[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[reflect(Default)]
 pub enum DropSizes {
     /// All alike, mm across.
     Same(f32),

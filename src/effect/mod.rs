@@ -26,6 +26,7 @@ pub use table::{EffectIndex, EffectRow, EffectTable};
 
 /// A kind of particle and the mark it leaves. Loaded from `*.effect.ron`.
 #[derive(Asset, Reflect, Serialize, Deserialize, Debug, Clone, PartialEq)]
+#[reflect(Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct WeatherEffect {
     /// What a particle carries, in mm³ (1 mm³ is 1 µl), if its emitter has no flow of its own. 0 or more, at most
@@ -85,6 +86,7 @@ pub struct WeatherEffect {
 
 /// What particles of an effect are made of.
 #[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Default)]
+#[reflect(Default)]
 pub enum Carries {
     /// Water.
     #[default]
@@ -111,6 +113,7 @@ impl Carries {
 
 /// A colour and how much of it a stamp lays over what was there.
 #[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[reflect(Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct Paint {
     /// Linear RGB, 0..=1.
@@ -121,6 +124,7 @@ pub struct Paint {
 
 /// How a particle in flight is drawn.
 #[derive(Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
+#[reflect(Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct ParticleLook {
     /// Linear RGBA, 0..=1.
@@ -137,6 +141,7 @@ pub struct ParticleLook {
 
 /// What a particle looks like.
 #[derive(Reflect, Serialize, Deserialize, Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[reflect(Default)]
 pub enum Sprite {
     /// A drop that falls while the shutter is open.
     #[default]

@@ -11,6 +11,7 @@ use crate::stamps::{RgbaStrip, StampKind, StampOptions, StampSet, stamps};
 
 /// Where the shapes of an effect's marks come from.
 #[derive(Reflect, Serialize, Deserialize, Debug, Default, Clone, PartialEq, Eq)]
+#[reflect(Default)]
 pub enum StampSource {
     /// Round domes.
     #[default]
@@ -33,6 +34,7 @@ pub enum StampSource {
 
 /// How the stamp of an impact is turned about the surface's normal.
 #[derive(Reflect, Serialize, Deserialize, Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[reflect(Default)]
 pub enum StampTurn {
     /// At random.
     #[default]

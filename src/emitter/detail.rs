@@ -9,7 +9,7 @@ use bevy::prelude::*;
 /// Level of detail of emission: how many of the particles that emitters ask for are sent. 1 unless something steers it, as
 /// [`LiveBudgetPlugin`](crate::overload::LiveBudgetPlugin) does; then nothing is changed in what is emitted.
 #[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct EmissionDetail {
     factor: f32,
     /// Part of a particle that may be sent on top, 0..1.

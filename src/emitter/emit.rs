@@ -179,8 +179,8 @@ pub(super) fn emit_particles(
     new.attribute_to(Source::UNKNOWN);
 }
 
-/// Spawns what [`emit_particles`] wrote, in one batch.
-pub(super) fn spawn_particles(
+/// Spawns what [`emit_particles`] wrote, and what others put beside it since the last tick, in one batch.
+pub(crate) fn spawn_particles(
     mut new: ResMut<NewParticles>,
     mut particles: ResMut<Particles>,
     mut counts: ResMut<ParticleCounts>,

@@ -27,14 +27,15 @@ use crate::schedule::{WeatheringSystems, WeatheringTick};
 
 pub use detail::EmissionDetail;
 pub use emit::NewParticles;
-use emit::{emit_particles, spawn_particles};
+use emit::emit_particles;
+pub(crate) use emit::spawn_particles;
 pub use silent::NotEmitting;
 pub use sources::{Source, TrackSources};
 pub use state::EmitterState;
 
 /// Sends out particles of one effect. Configuration only; see [`EmitterState`] for what it has done.
 #[derive(Component, Reflect, Debug, Clone)]
-#[reflect(Component)]
+#[reflect(Component, Default)]
 #[require(Transform, EmitterState)]
 pub struct Emitter {
     /// What it sends out. Nothing is emitted (nor owed) before the asset is loaded; if it cannot be, the log and
@@ -79,6 +80,7 @@ impl Default for Emitter {
 
 /// How much an emitter sends out.
 #[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Default)]
+#[reflect(Default)]
 pub enum Flow {
     /// Each particle what its effect says.
     #[default]
@@ -144,6 +146,7 @@ pub fn nozzle_speed(litres_per_minute: f32, radius: f32) -> f32 {
 
 /// Where on an emitter particles start. Lengths in metres, in the emitter's space; forward is -Z.
 #[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Default)]
+#[reflect(Default)]
 pub enum EmitterShape {
     /// All from the origin.
     #[default]
@@ -176,10 +179,10 @@ pub enum EmitterShape {
 
 /// Seeds every emitter's random stream. Changing it does not reseed streams already begun.
 #[derive(Resource, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct EmissionSeed(pub u64);
 
-/// Spawns the particles of all [`Emitter`]s.
+/// Lets all [`Emitter`]s write the particles that they owe.
 pub struct EmitterPlugin;
 
 impl Plugin for EmitterPlugin {
@@ -194,7 +197,11 @@ impl Plugin for EmitterPlugin {
             .init_resource::<NewParticles>()
             .add_systems(
                 WeatheringTick,
-                (place::place_new, emit_particles, spawn_particles).chain().in_set(WeatheringSystems::Emit),
+                // What is owed in a tick is born in it.
+                (place::place_new, emit_particles)
+                    .chain()
+                    .before(spawn_particles)
+                    .in_set(WeatheringSystems::Emit),
             )
             // When all that a frame loads and spawns is there.
             .add_systems(Last, silent::tell_silent);

@@ -15,6 +15,7 @@ use bevy::prelude::*;
 
 /// Where water came from, as a number: that of an emitter in [`TrackSources`], or one of the constants.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[reflect(Default)]
 pub struct Source(pub u16);
 
 impl Source {
@@ -27,7 +28,7 @@ impl Source {
 /// Asks for the source of all water: insert it to know which emitter wetted a texel, and remove it to save six bytes a
 /// texel. Holds the emitters that have sent anything since, in the order of their first particle.
 #[derive(Resource, Reflect, Debug, Default, Clone)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct TrackSources {
     emitters: Vec<Entity>,
 }

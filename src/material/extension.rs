@@ -69,6 +69,7 @@ pub struct PorousExtension {
 /// [`MatterLook`](crate::matter::MatterLook) as the shader reads it: `MatterUniform` in `shaders/common/wet_map.wgsl`, where the
 /// fields are told.
 #[derive(ShaderType, Reflect, Debug, Clone, Copy, Default, PartialEq)]
+#[reflect(Default)]
 #[expect(missing_docs, reason = "told in the shader; tests/layout.rs compares the two")]
 pub struct MatterUniform {
     pub dust_color: Vec3,
@@ -101,6 +102,7 @@ impl From<&MatterLook> for MatterUniform {
 /// [`PorousMaterial`](super::PorousMaterial) and [`StandingWater`](super::StandingWater) as the shader reads them:
 /// `PorousUniform` in `shaders/common/wet_map.wgsl`, where the fields are told.
 #[derive(ShaderType, Reflect, Debug, Clone, Copy, Default, PartialEq)]
+#[reflect(Default)]
 #[expect(missing_docs, reason = "told in the shader; tests/layout.rs compares the two")]
 pub struct PorousUniform {
     pub wet_color: Vec3,

@@ -37,6 +37,7 @@ use bevy::prelude::*;
 use bevy::render::RenderApp;
 use bevy::shader::load_shader_library;
 
+use crate::matter::MatterLook;
 use crate::overlay::deposit::note_traces;
 use crate::wetting::gpu::WaterUploadSystems;
 
@@ -86,6 +87,7 @@ impl Plugin for PorousMaterialPlugin {
         embedded_asset!(app, "../../shaders/weathered.wgsl");
         app.add_plugins(MaterialPlugin::<WeatheredMaterial>::default())
             .add_plugins((clock::plugin, warm_up::plugin))
+            .init_resource::<MatterLook>()
             .add_observer(exchange::release_surface)
             .add_observer(exchange::note_removed)
             .add_systems(

@@ -9,7 +9,7 @@ use bevy::prelude::*;
 /// Nothing is computed but in the shader, so it is free but for being drawn, and can be scrubbed like any time.
 /// Maps are made by [`wetmap`](crate::wetmap).
 #[derive(Component, Reflect, Debug, Clone, PartialEq)]
-#[reflect(Component)]
+#[reflect(Component, Default)]
 pub struct PlayedWetMap {
     /// Linear; red counts.
     pub map: Handle<Image>,
@@ -25,6 +25,7 @@ pub struct PlayedWetMap {
 
 /// Which way a wet map is played.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[reflect(Default)]
 pub enum Playing {
     /// From dry to wet.
     #[default]

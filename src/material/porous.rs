@@ -10,7 +10,7 @@ use crate::wetting::evolve::Matter;
 /// without it, the default is used. May be changed at any time. [`PorousMaterial::BRICK`] and others are
 /// [`presets`](super::presets).
 #[derive(Component, Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
-#[reflect(Component)]
+#[reflect(Component, Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct PorousMaterial {
     /// What water does to its look.
@@ -75,6 +75,7 @@ impl PorousMaterial {
 
 /// A way to look wet. One per material, so that darkenings never stack by accident.
 #[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
+#[reflect(Default)]
 pub enum WettingModel {
     /// Filled pores give back no diffuse light and mirror instead; see [`hnat`](super::models::hnat). A film on top
     /// reflects, but does not darken.
@@ -110,6 +111,7 @@ impl WettingModel {
 
 /// Parameters of the porous BRDF.
 #[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
+#[reflect(Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct Pores {
     /// α_poro, the part of the surface that is pores; 0 (glazed) to 1.
@@ -142,6 +144,7 @@ impl Default for Pores {
 
 /// Parameters of a film over rough matter.
 #[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
+#[reflect(Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct Coated {
     /// Part of the surface that is rough matter and takes the film, 0 (glazed) to 1.
@@ -163,6 +166,7 @@ impl Default for Coated {
 
 /// Parameters of matter made of grains.
 #[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
+#[reflect(Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct Grains {
     /// Part of the surface that is grains, 0 (glazed) to 1.
@@ -185,6 +189,7 @@ impl Default for Grains {
 
 /// Parameters of the tweak of albedo and gloss.
 #[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
+#[reflect(Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct Tweaked {
     /// 0 (glazed) to 1; what `source` says multiplies it.
@@ -203,6 +208,7 @@ impl Default for Tweaked {
 
 /// Where the porosity of a texel comes from.
 #[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[reflect(Default)]
 pub enum PorositySource {
     /// The same everywhere.
     #[default]
@@ -217,6 +223,7 @@ pub enum PorositySource {
 
 /// A second set of parameters, for wetness 1.
 #[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
+#[reflect(Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct WetLook {
     /// Linear RGB; multiplies [`WettingTextures::wet_color`] or, without it, the dry colour.
@@ -235,6 +242,7 @@ impl Default for WetLook {
 
 /// What a base colour texture is a picture of.
 #[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[reflect(Default)]
 pub enum TextureMeaning {
     /// The porous surface, dry: a photograph. Wetness multiplies by `kd_w / kd'`.
     #[default]
@@ -245,6 +253,7 @@ pub enum TextureMeaning {
 
 /// The BRDF under the post-process.
 #[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[reflect(Default)]
 pub enum BaseBrdf {
     /// Bevy's own: GGX and Burley's diffuse.
     #[default]
@@ -255,7 +264,7 @@ pub enum BaseBrdf {
 
 /// Textures that say how water acts from place to place, in the uvs of the base colour. Optional, on the same entity.
 #[derive(Component, Reflect, Debug, Clone, Default, PartialEq)]
-#[reflect(Component)]
+#[reflect(Component, Default)]
 pub struct WettingTextures {
     /// Red: porosity or mask, see [`PorositySource`]. Green: height of the relief, 1 is on top, see
     /// [`Flood`](super::Flood). Linear.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Standing water and what rain that is not simulated does to it. Optional, on an entity with
 /// [`Weatherable`](crate::overlay::Weatherable); what particles bring comes on top.
 #[derive(Component, Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq)]
-#[reflect(Component)]
+#[reflect(Component, Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct StandingWater {
     /// Where it stands.
@@ -38,6 +38,7 @@ impl Default for StandingWater {
 /// [`WettingTextures::surface`](super::WettingTextures::surface), paint that of the vertex colours; both are 1 where
 /// they are missing. On a surface with a flood, vertex colours are not seen as colours.
 #[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Default)]
+#[reflect(Default)]
 pub enum Flood {
     /// Nowhere.
     #[default]

@@ -23,7 +23,7 @@ use crate::wetting::{TexelGeometry, Units};
 
 /// How dust, mud and snow look, on all surfaces. May be changed at any time.
 #[derive(Resource, Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct MatterLook {
     /// Dry soil, linear RGB, 0..=1.

@@ -31,8 +31,6 @@ pub mod wash;
 
 use bevy::prelude::*;
 
-use crate::overlay::Weatherable;
-
 pub(crate) use look::pack_matter;
 pub use look::{GpuTexelMatter, MatterLook};
 pub use settle::{Deposit, DepositStamp};
@@ -53,16 +51,12 @@ pub struct MatterQueue(pub Vec<Deposit>);
 #[derive(Component, Debug, Default)]
 pub struct FallingSnow(pub Vec<SnowFall>);
 
-/// Gives surfaces room for matter. What moves it is part of the tick of [`WettingPlugin`](crate::wetting::WettingPlugin),
-/// which needs it.
+/// Lets dust, mud and snow look as you say ([`MatterLook`]). What gives surfaces room for them, and moves them, is part of the
+/// tick of [`WettingPlugin`](crate::wetting::WettingPlugin).
 pub struct MatterPlugin;
 
 impl Plugin for MatterPlugin {
     fn build(&self, app: &mut App) {
-        app.register_required_components::<Weatherable, SurfaceMatter>()
-            .register_required_components::<Weatherable, MatterQueue>()
-            .register_required_components::<Weatherable, FallingSnow>()
-            .register_type::<MatterLook>()
-            .init_resource::<MatterLook>();
+        app.register_type::<MatterLook>().init_resource::<MatterLook>();
     }
 }

@@ -10,7 +10,7 @@ use super::Splat;
 ///
 /// [`CpuOverlayPlugin`](super::CpuOverlayPlugin) paints in the tick and has no use for it.
 #[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct SplatBudget {
     /// Splats; 1 or more, and at most that of [`Self::LARGEST`].
     pub per_frame: u32,

@@ -29,7 +29,7 @@ pub struct SplatQueue {
 
 /// What has ever come to a surface. What has not come need not be looked for when it is drawn.
 #[derive(Component, Reflect, Serialize, Deserialize, Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[reflect(Component)]
+#[reflect(Component, Default)]
 pub struct SurfaceTraces {
     /// Water.
     pub water: bool,
@@ -85,7 +85,7 @@ impl SplatQueue {
 
 /// What a surface has received.
 #[derive(Component, Reflect, Serialize, Deserialize, Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[reflect(Component)]
+#[reflect(Component, Default)]
 pub struct SurfaceTotals {
     /// Particles that hit it.
     pub impacts: u64,

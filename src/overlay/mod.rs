@@ -62,7 +62,7 @@ pub use tiles::{TILE_SIZE, TileBins, TileHeader};
 /// Goes on the entity that has the `Mesh3d`, and needs a mesh with texture coordinates, or one that can be unwrapped
 /// ([`OverlayUv`]). Where a `StandardMaterial` is on the entity, it is exchanged for its weathered form with the same settings.
 #[derive(Component, Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq)]
-#[reflect(Component)]
+#[reflect(Component, Default)]
 #[serde(deny_unknown_fields, default)]
 pub struct Weatherable {
     /// The most texels along each side of the maps; a multiple of [`TILE_SIZE`] from 16 to [`Self::MAX_MAP_SIZE`]. As many
@@ -85,6 +85,7 @@ pub struct Weatherable {
 /// ([`unwrap`](crate::unwrap)); stamps on the map of such a surface ([`StampSpace::Map`]) end best at its edges
 /// ([`Wrap::Clamp`]), since what lies at the opposite one is another part of the mesh.
 #[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[reflect(Default)]
 pub enum OverlayUv {
     /// Unique ones, if those of the mesh are not: if they tile, lie on each other, or are not there. Then a `UV_1` of the mesh
     /// that is unique is taken as it is; one that is not is left alone, as something may be drawn by it, and so are uvs that
@@ -101,6 +102,7 @@ pub enum OverlayUv {
 
 /// Where the stamps of a surface lie.
 #[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[reflect(Default)]
 pub enum StampSpace {
     /// On the surface: round whatever the uvs do to it, across the borders of uv islands and never on a neighbour in the
     /// image. Takes 16 bytes a texel once something is painted, twice with a renderer. On surfaces that are posed a stamp is round
@@ -113,6 +115,7 @@ pub enum StampSpace {
 
 /// What happens to a stamp at an edge of the map.
 #[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[reflect(Default)]
 pub enum Wrap {
     /// It goes on at the opposite edge; uvs outside 0..1 tile.
     #[default]

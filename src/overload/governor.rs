@@ -39,6 +39,7 @@ pub struct TickReading {
 
 /// Steers the [detail](EmissionDetail) of emission by what ticks take. Starts at 1.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq)]
+#[reflect(Default)]
 pub struct Governor {
     factor: f32,
     /// What a tick takes, smoothed over a few.

@@ -14,7 +14,7 @@ use crate::schedule::run_tick;
 
 /// How much time ticks may take where somebody watches.
 #[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct LiveBudget {
     /// Part of real time that ticks may take, above 0; the rest is for drawing. At 60 ticks a second, 0.7 are 11.7 ms a tick.
     /// Where they take more, there are fewer particles.
@@ -50,7 +50,7 @@ impl LiveBudget {
 
 /// How much there is to do, and what is done about it.
 #[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct LiveLoad {
     /// Steers the number of particles.
     pub governor: Governor,
@@ -87,6 +87,7 @@ impl Plugin for LiveBudgetPlugin {
             .init_resource::<LiveBudget>()
             .init_resource::<LiveLoad>()
             .init_resource::<BeforeTick>()
+            .init_resource::<EmissionDetail>()
             // Limits the time that is about to be measured.
             .add_systems(First, pace.before(TimeSystems))
             // Around the whole tick, and nothing else.

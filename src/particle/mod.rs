@@ -25,6 +25,7 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::EffectIndex;
+use crate::emitter::{NewParticles, spawn_particles};
 use crate::schedule::{RetireSystems, WeatheringSystems, WeatheringTick};
 use crate::weather::Weather;
 
@@ -90,7 +91,7 @@ pub(crate) fn swept_seconds(seconds_moved: f32) -> f32 {
 
 /// Gravity, the same everywhere. The wind is the [`Weather`]'s.
 #[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct Forces {
     /// m/s².
     pub gravity: Vec3,
@@ -105,7 +106,7 @@ impl Default for Forces {
 /// What has happened to all particles so far. `emitted == alive + hit + expired` after every tick, of whatever you put into
 /// [`Particles`], too: each tick counts what is there.
 #[derive(Resource, Reflect, Serialize, Deserialize, Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct ParticleCounts {
     /// Particles spawned.
     pub emitted: u64,
@@ -146,7 +147,7 @@ impl WaterCounts {
 
 /// Limits on particles.
 #[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct ParticleConfig {
     /// The most particles that may be in flight. What emitters would add beyond it is cut from all alike, and counted as
     /// [refused](ParticleCounts::refused) or [merged](ParticleCounts::merged). Drips always fall: emitters make room for
@@ -160,7 +161,7 @@ impl Default for ParticleConfig {
     }
 }
 
-/// Moves and retires particles.
+/// Spawns, moves and retires particles, whoever made them.
 pub struct ParticlePlugin;
 
 impl Plugin for ParticlePlugin {
@@ -174,9 +175,11 @@ impl Plugin for ParticlePlugin {
             .init_resource::<ParticleCounts>()
             .init_resource::<WaterCounts>()
             .init_resource::<Particles>()
+            .init_resource::<NewParticles>()
             .add_systems(
                 WeatheringTick,
                 (
+                    spawn_particles.in_set(WeatheringSystems::Emit),
                     integrate_particles.in_set(WeatheringSystems::Integrate),
                     retire_particles.in_set(RetireSystems),
                 ),

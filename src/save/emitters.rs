@@ -18,13 +18,13 @@ const FAR: f32 = 1.0e5;
 
 /// An emitter beside those of the scenario, with a [`stream`](Emitter::stream) behind theirs. It goes with the scene.
 #[derive(Component, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[reflect(Component)]
+#[reflect(Component, Default)]
 #[require(SceneEntity)]
 pub struct AddedEmitter;
 
 /// An emitter of the scenario that was removed: it is there still, switched off, since a saved scene has all of them.
 #[derive(Component, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
-#[reflect(Component)]
+#[reflect(Component, Default)]
 pub struct RemovedEmitter;
 
 /// What `state.ron` says of what emitters are.

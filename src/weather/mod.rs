@@ -22,7 +22,7 @@ pub use drying_clock::{DryingClock, DryingPoint, advance_drying_clock};
 
 /// How the weather is, everywhere. May be changed at any time; what has dried until then stays dry.
 #[derive(Resource, Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct Weather {
     /// °C, -40..=60. At 0 and below nothing evaporates here.
     pub temperature_c: f32,

@@ -66,8 +66,10 @@ mod walk;
 use bevy::prelude::*;
 
 use crate::effect::{EffectTable, WeatherEffect};
+use crate::matter::{FallingSnow, MatterQueue, SurfaceMatter};
 use crate::overlay::Weatherable;
 use crate::schedule::{WeatheringSystems, WeatheringTick};
+use crate::weather::{DryingClock, Weather};
 
 pub use drip::{Drip, DripEffect, DripSite, drip_effect, muddy_drip_effect, snow_fall_effect};
 pub use exposure::{Exposure, ExposureProgress};
@@ -111,12 +113,16 @@ pub struct DropQueue(pub Vec<Drop>);
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct MeasureSystems;
 
-/// Simulates water on surfaces. Needs no render app.
+/// Simulates water on surfaces, and the dust, mud and snow that it meets there. Needs no render app.
 pub struct WettingPlugin;
 
 impl Plugin for WettingPlugin {
     fn build(&self, app: &mut App) {
-        app.register_required_components::<Weatherable, DropQueue>()
+        app.register_required_components::<Weatherable, SurfaceMatter>()
+            // Queues are there where somebody empties them.
+            .register_required_components::<Weatherable, MatterQueue>()
+            .register_required_components::<Weatherable, FallingSnow>()
+            .register_required_components::<Weatherable, DropQueue>()
             .register_required_components::<Weatherable, Dripping>()
             .register_type::<WatchWetness>()
             .register_type::<Origin>()
@@ -126,6 +132,8 @@ impl Plugin for WettingPlugin {
             .init_resource::<WettingStats>()
             .init_resource::<DripEffect>()
             .init_resource::<ExposureProgress>()
+            .init_resource::<DryingClock>()
+            .init_resource::<Weather>()
             .add_message::<BecameWet>()
             .add_message::<Dried>()
             .add_message::<SurfaceReady>()

@@ -15,6 +15,7 @@ use crate::emitter::{Source, TrackSources};
 
 /// Where the water of a texel came from.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[reflect(Default)]
 pub struct Origin {
     /// Whose the last of it was.
     pub source: Source,

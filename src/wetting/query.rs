@@ -12,6 +12,7 @@ use crate::weather::DryingClock;
 
 /// How wet a place is.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Default)]
+#[reflect(Default)]
 pub struct Wetness {
     /// How wet it looks, 0..=1: 1 where a film lies.
     pub wetness: f32,
@@ -25,6 +26,7 @@ pub struct Wetness {
 
 /// How wet a whole surface is.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Default)]
+#[reflect(Default)]
 pub struct SurfaceWetness {
     /// Part of its area that looks wetter than a half, 0..=1.
     pub wet_fraction: f32,
@@ -181,7 +183,7 @@ pub(crate) fn summary(water: &SurfaceWater, now: &Now) -> SurfaceWetness {
 
 /// Asks for [`BecameWet`] and [`Dried`] messages about this surface, by [`SurfaceWetness::wet_fraction`].
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
-#[reflect(Component)]
+#[reflect(Component, Default)]
 pub struct WatchWetness {
     /// It has become wet when more than this part of its area is, 0..=1.
     pub wet_above: f32,

@@ -10,7 +10,7 @@ use crate::clock::WeatheringClock;
 /// run by what was measured of them, when their marks know where on them they lie, when they move over to maps of another size, and when
 /// they dry by a sun that has moved. Until then it is the old shape, slopes, maps and shadows that count, and of what is new, none.
 #[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub enum MeasureTiming {
     /// As soon as it is ready: no frame waits for it, and no two runs need be alike.
     #[default]

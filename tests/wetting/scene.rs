@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use bevy::app::PluginGroupBuilder;
 use bevy::asset::AssetPlugin;
 use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
@@ -24,9 +25,14 @@ impl Scene {
 
     /// The same with files of its own.
     pub fn with_assets(hz: u32, assets: AssetPlugin) -> Self {
+        Self::with_parts(WeatheringPlugins.set(ClockPlugin { hz }), assets)
+    }
+
+    /// The same of some parts.
+    pub fn with_parts(parts: PluginGroupBuilder, assets: AssetPlugin) -> Self {
         let mut app = App::new();
         app.add_plugins((MinimalPlugins, TransformPlugin, assets, MeshPlugin))
-            .add_plugins(WeatheringPlugins.set(ClockPlugin { hz }))
+            .add_plugins(parts)
             .add_plugins(CpuOverlayPlugin)
             .insert_resource(TimeUpdateStrategy::FixedTimesteps(0));
         app.world_mut().resource_mut::<Weather>().drying_speed = 0.0;

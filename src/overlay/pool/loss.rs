@@ -12,7 +12,7 @@ use crate::wetting::{Ledger, Stock, Units};
 /// `received + melted + painted = water + evaporated + dripped + spilled + wiped`, and for matter as in
 /// [`MatterLedger`](crate::matter::MatterLedger) with `soil` and `snow` in place of what lies on the surface.
 #[derive(Component, Reflect, Serialize, Deserialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[reflect(Component)]
+#[reflect(Component, Default)]
 pub struct MapLoss {
     /// Impacts on it while it had no maps, and splats that still waited when it lost them.
     pub unpainted: u64,

@@ -50,7 +50,7 @@ pub(crate) use resize::{
 /// How much memory of the GPU the maps of all surfaces may take, and how fine they are. May be changed at any time: where
 /// it becomes too little, maps are halved, and taken away where that is not enough.
 #[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct MapBudget {
     /// Bytes of all maps and of the water and matter that is drawn.
     pub bytes: u64,
@@ -130,7 +130,7 @@ struct SurfaceOrder(u64);
 
 /// The maps of all surfaces, in numbers. Brought to the present once a frame.
 #[derive(Resource, Reflect, Serialize, Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct MapPool {
     /// Bytes on the GPU of what surfaces hold. Without a renderer: what it would be with one.
     pub used: u64,

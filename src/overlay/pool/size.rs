@@ -17,6 +17,7 @@ use crate::wetting::{DripEffect, SurfaceWater, WetGeometry};
 
 /// What may fall by the effects that there are.
 #[derive(Reflect, Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[reflect(Default)]
 pub(super) struct Falling {
     /// Something that leaves marks.
     paint: bool,

@@ -14,7 +14,7 @@ use crate::particle::Sequence;
 
 /// How many splashes are shown, and how long.
 #[derive(Resource, Reflect, Debug, Clone, Copy, PartialEq)]
-#[reflect(Resource)]
+#[reflect(Resource, Default)]
 pub struct SplashConfig {
     /// The most at a time, at most [`Self::MOST`]: new ones take the place of the oldest. 0 for none.
     pub max: u32,
