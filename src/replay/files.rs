@@ -35,6 +35,12 @@ pub(super) fn frame_file(number: u32) -> String {
     format!("frame_{number:05}.png")
 }
 
+/// The number of a picture by its file; `None` for what [`frame_file`] never names.
+fn frame_number(name: &str) -> Option<u32> {
+    let number = name.strip_prefix("frame_")?.strip_suffix(".png")?.parse::<u32>().ok()?;
+    (frame_file(number) == name).then_some(number)
+}
+
 /// The file of a picture that an event asked for.
 pub(super) fn capture_file(name: &str) -> String {
     format!("capture_{name}.png")
@@ -52,11 +58,7 @@ pub(super) fn export_folder(name: &str) -> String {
 /// # Errors
 /// [`ReplayError::Write`] with the file.
 pub(super) fn remove_earlier_run(folder: &Path, first: u32, kept: &[String]) -> Result<(), ReplayError> {
-    let is_frame = |name: &str| {
-        let number = name.strip_prefix("frame_").and_then(|name| name.strip_suffix(".png"));
-        let is_number = |text: &&str| text.len() >= 5 && text.bytes().all(|byte| byte.is_ascii_digit());
-        number.filter(is_number).is_some_and(|text| text.parse::<u32>().is_ok_and(|number| number >= first))
-    };
+    let is_frame = |name: &str| frame_number(name).is_some_and(|number| number >= first);
     let is_capture = |name: &str| {
         name.starts_with("capture_") && name.ends_with(".png") && !kept.iter().any(|file| file == name)
     };
@@ -131,10 +133,10 @@ pub(super) fn remove_earlier_outputs(folder: &Path) -> Result<(), ReplayError> {
 
 /// The numbers and files of all pictures in a folder, in order.
 pub(super) fn frames(folder: &Path) -> Vec<(u32, PathBuf)> {
-    let number = |name: &str| name.strip_prefix("frame_")?.strip_suffix(".png")?.parse::<u32>().ok();
     let entries = fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
-    let mut frames: Vec<(u32, PathBuf)> =
-        entries.filter_map(|entry| Some((number(entry.file_name().to_str()?)?, entry.path()))).collect();
+    let mut frames: Vec<(u32, PathBuf)> = entries
+        .filter_map(|entry| Some((frame_number(entry.file_name().to_str()?)?, entry.path())))
+        .collect();
     frames.sort();
     frames
 }
@@ -168,7 +170,9 @@ mod tests {
     #[test]
     fn pictures_are_found_in_their_order() {
         let folder = tempfile::tempdir().unwrap();
-        for name in ["frame_00010.png", "frame_00002.png", "frame_100000.png", "frame_x.png", "sheet.png"] {
+        let ours = ["frame_00010.png", "frame_00002.png", "frame_100000.png"];
+        let others = ["frame_7.png", "frame_000003.png", "frame_+0004.png", "frame_x.png", "sheet.png"];
+        for name in ours.into_iter().chain(others) {
             write_atomic(&folder.path().join(name), b"x").unwrap();
         }
         let numbers: Vec<u32> = frames(folder.path()).into_iter().map(|(number, _)| number).collect();
@@ -203,6 +207,7 @@ mod tests {
         ];
         let others = [
             "frame_1.png",
+            "frame_000001.png",
             "frame_abcde.png",
             "notes.txt",
             "maps/mine.png",
