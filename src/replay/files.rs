@@ -107,14 +107,17 @@ fn exports(folder: &Path) -> Vec<PathBuf> {
 pub const DONE_FILE: &str = "done.json";
 
 /// Removes what was made of an earlier run's pictures and numbers, the mark that it is done before all else, and what a run
-/// that was killed has left half-written.
+/// that was killed has left half-written. `goes_on`: the rows of the run that this one goes on with stay until those of this one
+/// take their place, so that they are not lost if it is killed.
 ///
 /// # Errors
 /// [`ReplayError::Write`] with the file.
-pub(super) fn remove_earlier_outputs(folder: &Path) -> Result<(), ReplayError> {
-    let made = [DONE_FILE, SERIES_FILE, TIMINGS_FILE, VIDEO_FILE, ANIMATION_FILE, SHEET_FILE];
+pub(super) fn remove_earlier_outputs(folder: &Path, goes_on: bool) -> Result<(), ReplayError> {
+    let made = [DONE_FILE, VIDEO_FILE, ANIMATION_FILE, SHEET_FILE];
+    let rows = [SERIES_FILE, TIMINGS_FILE].into_iter().filter(|_| !goes_on);
     let plots = folder.join(PLOTS_FOLDER);
-    let files = made.map(|file| folder.join(file)).into_iter().chain(PLOT_FILES.map(|file| plots.join(file)));
+    let files = made.into_iter().chain(rows).map(|file| folder.join(file));
+    let files = files.chain(PLOT_FILES.map(|file| plots.join(file)));
     let maps = folder.join("maps");
     for path in files {
         match fs::remove_file(&path) {
@@ -161,10 +164,22 @@ mod tests {
         for name in made.iter().chain(&below).chain(&others) {
             write_atomic(&folder.path().join(name), b"x").unwrap();
         }
-        remove_earlier_outputs(folder.path()).unwrap();
+        remove_earlier_outputs(folder.path(), false).unwrap();
         assert!(made.iter().chain(&below).all(|name| !folder.path().join(name).exists()));
         assert!(others.iter().all(|name| folder.path().join(name).exists()));
-        remove_earlier_outputs(&folder.path().join("nowhere")).unwrap();
+        remove_earlier_outputs(&folder.path().join("nowhere"), false).unwrap();
+    }
+
+    #[test]
+    fn rows_of_the_run_that_is_gone_on_with_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let (rows, made) = (["series.csv", "timings.csv"], ["done.json", "sheet.png", "plots/film.svg"]);
+        for name in rows.iter().chain(&made) {
+            write_atomic(&folder.path().join(name), b"x").unwrap();
+        }
+        remove_earlier_outputs(folder.path(), true).unwrap();
+        assert!(rows.iter().all(|name| folder.path().join(name).exists()));
+        assert!(made.iter().all(|name| !folder.path().join(name).exists()));
     }
 
     #[test]

@@ -104,7 +104,7 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
     if let Some(out) = &options.out {
         files::require_writable(out)?;
         earlier = options.resume.is_some().then(|| SeriesTables::read(out));
-        files::remove_earlier_outputs(out)?;
+        files::remove_earlier_outputs(out, earlier.is_some())?;
         files::remove_earlier_run(out, frames.start, &made)?;
         run.begin_series(every);
     }
