@@ -24,7 +24,7 @@ pub struct ReplayOptions {
     pub seconds: Option<f32>,
     /// In place of the scenario's seed. Not with `resume`: a saved scene goes on with its own.
     pub seed: Option<u64>,
-    /// Threads to compute ticks with; all cores if `None`. The first replay of a process decides for all that follow.
+    /// Threads to compute ticks with, up to [`Self::MAX_THREADS`]; all cores if `None`. The first replay of a process decides for all that follow.
     /// Exposure to air and sun is found out by a thread of the operating system for each core, whatever this says.
     pub threads: Option<usize>,
     /// Draw pictures.
@@ -52,6 +52,8 @@ impl ReplayOptions {
     pub const MAX_SIZE: u32 = 8192;
     /// The most pictures on a contact sheet.
     pub const MAX_SHEET: u32 = 400;
+    /// The most threads: many more than these a system may refuse to start.
+    pub const MAX_THREADS: usize = 1024;
 
     /// A run of `scenario` that draws small pictures at 24 a second.
     pub fn new(scenario: LoadedScenario) -> Self {
@@ -112,8 +114,10 @@ impl ReplayOptions {
         {
             return wrong("seconds", seconds.to_string(), format!("above 0 and at most {most}"));
         }
-        if self.threads == Some(0) {
-            return wrong("threads", "0".into(), "at least 1".into());
+        if let Some(threads) = self.threads
+            && !(1..=Self::MAX_THREADS).contains(&threads)
+        {
+            return wrong("threads", threads.to_string(), format!("1 to {}", Self::MAX_THREADS));
         }
         if let (Some(seed), Some(_)) = (self.seed, &self.resume) {
             return wrong(
