@@ -15,7 +15,8 @@ use crate::scenario::{LoadedScenario, exports};
 pub struct ReplayOptions {
     /// The scenario.
     pub scenario: LoadedScenario,
-    /// Folder for all that is written; made if missing. `None` writes nothing.
+    /// Folder for all that is written; made if missing. None in which that would replace a file that the scenario reads. `None`
+    /// writes nothing.
     pub out: Option<PathBuf>,
     /// Pictures per second of weather time; at least 1. Without a renderer there are none.
     pub fps: u32,
