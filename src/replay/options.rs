@@ -26,7 +26,8 @@ pub struct ReplayOptions {
     pub seconds: Option<f32>,
     /// In place of the scenario's seed. Not with `resume`: a saved scene goes on with its own.
     pub seed: Option<u64>,
-    /// Threads to compute ticks with, up to [`Self::MAX_THREADS`]; all cores if `None`. The first replay of a process decides for all that follow.
+    /// Threads to compute ticks with, up to [`Self::MAX_THREADS`]; all cores if `None`. The first replay of a process decides for
+    /// all that follow.
     /// Exposure to air and sun is found out by a thread of the operating system for each core, whatever this says.
     pub threads: Option<usize>,
     /// Draw pictures.
