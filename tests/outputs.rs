@@ -196,6 +196,8 @@ fn what_cannot_be_made_is_refused() {
         ("--no-render --video", "--video"),
         ("--no-render --sheet", "--sheet"),
         ("--sheet=0", "`sheet`"),
+        ("--threads 0", "`threads`"),
+        ("--threads 20000", "1 to 1024"),
         ("--jobs 0", "--jobs"),
         ("--only 1", "--only"),
         ("--jobs 2 --resume state", "--resume"),

@@ -321,6 +321,32 @@ fn out_holds_the_report_and_the_maps_and_nothing_else() {
 }
 
 #[test]
+fn what_the_scenario_reads_is_not_replaced_and_what_is_no_map_of_the_run_stays() {
+    let tree = Tree::new();
+    let out = tree.path("tree/out");
+    fs::create_dir_all(out.join("maps")).unwrap();
+    let pictures = ["maps/ground_diffuse.png", "maps/clay_diffuse.png", "maps/clay_normal.png"];
+    for name in pictures {
+        fs::write(out.join(name), "mine").unwrap();
+    }
+    let before = files_below(&out);
+    let reading = |name: &str| {
+        let file = tree.spoilt("\"plain\": ()", &format!("\"plain\": (texture: Photo(\"out/{name}\"))"));
+        run(replay(&file, "--no-render --out").arg(&out))
+    };
+    let outcome = reading("maps/ground_diffuse.png");
+    assert_eq!(outcome.code, Some(2), "{}", outcome.stderr);
+    for named in ["`out`", "maps/ground_diffuse.png"] {
+        assert!(outcome.stderr.contains(named), "{}", outcome.stderr);
+    }
+    assert_eq!(files_below(&out), before);
+    // That of no surface is in nobody's way.
+    reading("maps/clay_diffuse.png").assert_success();
+    let is_mine = |name: &str| fs::read(out.join(name)).is_ok_and(|bytes| bytes == b"mine");
+    assert_eq!(pictures.map(is_mine), [false, true, true]);
+}
+
+#[test]
 fn the_maps_hold_the_water_in_micrometres() {
     let tree = Tree::new();
     let out = tree.path("out");

@@ -5,6 +5,7 @@ use crate::clock::WeatheringClock;
 use crate::effect::{ShippedEffect, WeatherEffect};
 use crate::material::PorousMaterial;
 use crate::overlay::{TILE_SIZE, Weatherable};
+use crate::replay::ReplayOptions;
 use crate::scenario::check_weather;
 use crate::weather::Weather;
 
@@ -33,7 +34,8 @@ pub struct ExportOptions {
     pub particles_per_second: f32,
     /// Seed of the rain.
     pub seed: u64,
-    /// Threads to compute ticks with; all cores if `None`. The first app of a process decides for all that follow.
+    /// Threads to compute ticks with, up to [`ReplayOptions::MAX_THREADS`]; all cores if `None`. The first app of a process
+    /// decides for all that follow.
     pub threads: Option<usize>,
 }
 
@@ -119,8 +121,14 @@ impl ExportOptions {
         if !self.map_size.is_multiple_of(TILE_SIZE) {
             return Err(wrong("size", self.map_size.to_string(), format!("a multiple of {TILE_SIZE}")));
         }
-        if self.threads == Some(0) {
-            return Err(wrong("threads", "0".into(), "at least 1".into()));
+        if let Some(threads) = self.threads
+            && !(1..=ReplayOptions::MAX_THREADS).contains(&threads)
+        {
+            return Err(wrong(
+                "threads",
+                threads.to_string(),
+                format!("1 to {}", ReplayOptions::MAX_THREADS),
+            ));
         }
         Ok(self.effect.validate()?)
     }
@@ -141,7 +149,7 @@ mod tests {
     #[test]
     fn what_is_out_of_range_is_named() {
         type Edit = fn(&mut ExportOptions);
-        let edits: [(Edit, &str); 8] = [
+        let edits: [(Edit, &str); 9] = [
             (|options| options.rain_mm_per_h = 0.0, "`rain`"),
             (|options| options.minutes = f32::NAN, "`minutes`"),
             (|options| options.particles_per_second = -1.0, "`particles`"),
@@ -150,6 +158,7 @@ mod tests {
             (|options| options.texture_size = Some(1), "`texture-size`"),
             (|options| options.tick_hz = 0, "`hz`"),
             (|options| options.threads = Some(0), "`threads`"),
+            (|options| options.threads = Some(20_000), "`threads`"),
         ];
         for (edit, named) in edits {
             let mut options = ExportOptions::default();

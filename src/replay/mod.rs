@@ -36,6 +36,7 @@ mod sheet;
 mod table;
 mod video;
 
+use std::collections::BTreeSet;
 use std::time::Instant;
 
 use crate::clock::WeatheringClock;
@@ -104,10 +105,14 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
     }
     let mut earlier = None;
     if let Some(out) = &options.out {
+        let surfaces: BTreeSet<String> =
+            options.scenario.scenario.surface_names().map(String::from).collect();
+        let inputs = options.scenario.named_files()?;
+        files::refuse_inputs(&inputs, out, frames.start, &made, &surfaces)?;
         files::require_writable(out)?;
         earlier = options.resume.is_some().then(|| SeriesTables::read(out));
-        files::remove_earlier_outputs(out)?;
-        files::remove_earlier_run(out, frames.start, &made)?;
+        files::remove_earlier_outputs(out, earlier.is_some())?;
+        files::remove_earlier_run(out, frames.start, &made, &surfaces)?;
         run.begin_series(every);
     }
     let loaded = begun.elapsed();

@@ -1,20 +1,22 @@
 //! What to run and what to write.
 
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use bevy::prelude::*;
 
+use super::plots::PLOTS_FOLDER;
 use super::{ReplayError, files, sheet, video};
 use crate::clock::WeatheringClock;
 use crate::overlay::SplatBudget;
-use crate::scenario::LoadedScenario;
+use crate::scenario::{LoadedScenario, exports};
 
 /// What to run and what to write.
 #[derive(Debug, Clone)]
 pub struct ReplayOptions {
     /// The scenario.
     pub scenario: LoadedScenario,
-    /// Folder for all that is written; made if missing. `None` writes nothing.
+    /// Folder for all that is written; made if missing. None in which that would replace a file that the scenario reads. `None`
+    /// writes nothing.
     pub out: Option<PathBuf>,
     /// Pictures per second of weather time; at least 1. Without a renderer there are none.
     pub fps: u32,
@@ -24,14 +26,16 @@ pub struct ReplayOptions {
     pub seconds: Option<f32>,
     /// In place of the scenario's seed. Not with `resume`: a saved scene goes on with its own.
     pub seed: Option<u64>,
-    /// Threads to compute ticks with; all cores if `None`. The first replay of a process decides for all that follow.
+    /// Threads to compute ticks with, up to [`Self::MAX_THREADS`]; all cores if `None`. The first replay of a process decides for
+    /// all that follow.
     /// Exposure to air and sun is found out by a thread of the operating system for each core, whatever this says.
     pub threads: Option<usize>,
     /// Draw pictures.
     pub render: bool,
     /// A [saved scene](crate::save) to go on from.
     pub resume: Option<PathBuf>,
-    /// Folder to save the scene into at the end. Of its own: neither `out` nor one that holds it.
+    /// Folder to save the scene into at the end. Of its own: none that the run writes anything else into, and none that holds
+    /// such a one.
     pub save: Option<PathBuf>,
     /// What a frame may paint. Where it is not enough for the ticks of a frame, there are more frames: pictures and maps show
     /// all, whatever it is.
@@ -43,7 +47,8 @@ pub struct ReplayOptions {
     pub video: bool,
     /// Make a contact sheet of so many pictures, up to [`Self::MAX_SHEET`]. Needs `out` and `render`.
     pub sheet: Option<u32>,
-    /// Folder to [export](crate::export::Export::write) the scene into as it is at the end. Not `out`, and not in `save`.
+    /// Folder to [export](crate::export::Export::write) the scene into as it is at the end. Not `out`, and apart from
+    /// `save`.
     pub export: Option<PathBuf>,
 }
 
@@ -52,6 +57,8 @@ impl ReplayOptions {
     pub const MAX_SIZE: u32 = 8192;
     /// The most pictures on a contact sheet.
     pub const MAX_SHEET: u32 = 400;
+    /// The most threads: many more than these a system may refuse to start.
+    pub const MAX_THREADS: usize = 1024;
 
     /// A run of `scenario` that draws small pictures at 24 a second.
     pub fn new(scenario: LoadedScenario) -> Self {
@@ -112,8 +119,10 @@ impl ReplayOptions {
         {
             return wrong("seconds", seconds.to_string(), format!("above 0 and at most {most}"));
         }
-        if self.threads == Some(0) {
-            return wrong("threads", "0".into(), "at least 1".into());
+        if let Some(threads) = self.threads
+            && !(1..=Self::MAX_THREADS).contains(&threads)
+        {
+            return wrong("threads", threads.to_string(), format!("1 to {}", Self::MAX_THREADS));
         }
         if let (Some(seed), Some(_)) = (self.seed, &self.resume) {
             return wrong(
@@ -122,18 +131,18 @@ impl ReplayOptions {
                 "left out with `resume`: a saved scene has its own".into(),
             );
         }
-        let place = |folder: &Path| std::path::absolute(folder).unwrap_or_else(|_| folder.into());
-        if let (Some(save), Some(out)) = (&self.save, &self.out)
-            && place(out).join("maps").starts_with(place(save))
+        if let Some(save) = &self.save
+            && self.folders().iter().any(|folder| place(folder).starts_with(place(save)))
         {
             let value = save.display().to_string();
             return wrong("save", value, "a folder of its own, beside those of `out` or in them".into());
         }
         if let Some(export) = &self.export {
             let is_same = self.out.as_ref().is_some_and(|out| place(out) == place(export));
-            if is_same || self.save.as_ref().is_some_and(|save| place(export).starts_with(place(save))) {
+            let maps = place(&export.join("maps"));
+            if is_same || self.save.as_ref().is_some_and(|save| maps.starts_with(place(save))) {
                 let value = export.display().to_string();
-                return wrong("export", value, "another folder than `out`, and not in `save`".into());
+                return wrong("export", value, "another folder than `out`, and apart from `save`".into());
             }
         }
         if let Some(count) = self.sheet
@@ -147,5 +156,97 @@ impl ReplayOptions {
             }
         }
         self.series_ticks()
+    }
+
+    /// The innermost folders that a run makes in `out`.
+    fn folders(&self) -> Vec<PathBuf> {
+        let Some(out) = &self.out else { return Vec::new() };
+        let exports = exports(&self.scenario.scenario).into_iter();
+        let exports = exports.map(|(_, name)| out.join(files::export_folder(name)).join("maps"));
+        [out.join("maps"), out.join(PLOTS_FOLDER)].into_iter().chain(exports).collect()
+    }
+}
+
+/// Where a folder is, or will be: its parts one after the other, as the file system takes them. What is not there yet is no
+/// link.
+fn place(folder: &Path) -> PathBuf {
+    let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.into());
+    let mut place = PathBuf::new();
+    for part in folder.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir => {
+                place.pop();
+            }
+            Component::Normal(name) => {
+                place.push(name);
+                if let Ok(there) = place.canonicalize() {
+                    place = there;
+                }
+            }
+            root => place.push(root),
+        }
+    }
+    place
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::Scenario;
+
+    fn options(folder: &Path) -> ReplayOptions {
+        let file = folder.join("scene.ron");
+        let scenario = r#"(
+            seconds: 1.0,
+            camera: (keys: [(eye: (0.0, 1.0, 2.0), target: (0.0, 0.0, 0.0))]),
+            events: [(at: 0.5, what: Export("half"))],
+        )"#;
+        std::fs::write(&file, scenario).unwrap();
+        ReplayOptions { out: Some(folder.join("out")), ..ReplayOptions::new(Scenario::load(&file).unwrap()) }
+    }
+
+    #[test]
+    fn a_scene_is_saved_into_no_folder_of_the_run() {
+        let folder = tempfile::tempdir().unwrap();
+        let options = ReplayOptions { export: Some(folder.path().join("glb")), ..options(folder.path()) };
+        let check = |save: &str| {
+            let save = Some(folder.path().join(save));
+            ReplayOptions { save, ..options.clone() }.check().map_err(|error| error.to_string())
+        };
+        for save in [
+            ".",
+            "out",
+            "out/.",
+            "out/../out",
+            "out/x/..",
+            "new/../out/maps",
+            "out/maps",
+            "out/plots",
+            "out/export_half",
+            "out/export_half/maps",
+        ] {
+            let error = check(save).unwrap_err();
+            assert!(error.contains("`save`"), "{save}: {error}");
+        }
+        for save in ["glb", "glb/maps", "out/../glb"] {
+            let error = check(save).unwrap_err();
+            assert!(error.contains("`export`"), "{save}: {error}");
+        }
+        for save in ["kept", "out/kept", "out/maps/kept", "out/plots2", "out/../kept", "out/export_other"] {
+            check(save).unwrap();
+        }
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn links_are_what_they_lead_to() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir_all(folder.path().join("out/plots")).unwrap();
+        std::os::unix::fs::symlink(folder.path().join("out/plots"), folder.path().join("link")).unwrap();
+        for save in ["link", "link/..", "link/../maps"] {
+            let save = Some(folder.path().join(save));
+            assert!(ReplayOptions { save, ..options(folder.path()) }.check().is_err());
+        }
     }
 }

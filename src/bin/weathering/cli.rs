@@ -67,7 +67,7 @@ pub struct ReplayArgs {
     /// Seed, in place of the scenario's
     #[arg(long, conflicts_with = "resume", allow_negative_numbers = true)]
     pub seed: Option<u64>,
-    /// Threads to compute ticks with; how open surfaces lie is found out by all cores [default: all cores]
+    /// Threads to compute ticks with, up to 1024; how open surfaces lie is found out by all cores [default: all cores]
     #[arg(long, allow_negative_numbers = true)]
     pub threads: Option<usize>,
     /// Go on from a folder written by --save-state; of the pictures in --out, those from before stay

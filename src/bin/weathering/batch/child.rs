@@ -57,6 +57,9 @@ impl Children {
     }
 }
 
+/// How the line begins that tells why a child failed.
+const ERROR: &str = "error: ";
+
 fn finish(mut command: Command) -> io::Result<Ran> {
     command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped());
     // What it says is read by this program first.
@@ -71,11 +74,10 @@ fn finish(mut command: Command) -> io::Result<Ran> {
     if output.status.success() || output.status.code() == Some(1) {
         return Ok(Ran { result: Ok(()), said: text.into_owned() });
     }
-    // The last error tells why; where there is none, the last line.
+    // The last error tells why. Where there is none it did not end by itself, and any line may be about something else.
     let mut lines: Vec<&str> = text.lines().filter(|line| !line.trim().is_empty()).collect();
-    let error = lines.iter().rposition(|line| line.starts_with("error: "));
-    let reason = error.or(lines.len().checked_sub(1)).map(|at| lines.remove(at));
-    let reason = reason.map(|line| line.strip_prefix("error: ").unwrap_or(line).to_owned());
+    let error = lines.iter().rposition(|line| line.starts_with(ERROR));
+    let reason = error.map(|at| lines.remove(at).replacen(ERROR, "", 1));
     let reason = reason.unwrap_or_else(|| output.status.to_string());
     Ok(Ran { result: Err(reason), said: lines.join("\n") })
 }
@@ -90,4 +92,42 @@ fn exit_after_input() {
     // An error is an end, too.
     let _ = io::copy(&mut io::stdin().lock(), &mut io::sink());
     std::process::exit(3);
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    fn ran(script: &str) -> Ran {
+        let mut command = Command::new("sh");
+        command.arg("-c").arg(script);
+        finish(command).unwrap()
+    }
+
+    #[test]
+    fn a_child_failed_by_its_last_error_or_by_how_it_ended() {
+        let told =
+            ran("echo 'warning: x' >&2; echo 'error: a' >&2; echo 'error: error: b' >&2; echo y >&2; exit 2");
+        assert_eq!(told.result.unwrap_err(), "error: b");
+        assert_eq!(told.said, "warning: x\nerror: a\ny");
+
+        let killed = ran("echo 'warning: x' >&2; kill -9 $$");
+        let reason = killed.result.unwrap_err();
+        assert!(reason.contains("SIGKILL"), "{reason}");
+        assert_eq!(killed.said, "warning: x");
+
+        let panicked = ran("echo 'it panicked' >&2; echo 'note: run with a backtrace' >&2; exit 101");
+        let reason = panicked.result.unwrap_err();
+        assert!(reason.contains("101"), "{reason}");
+        assert_eq!(panicked.said, "it panicked\nnote: run with a backtrace");
+    }
+
+    #[test]
+    fn what_came_to_its_end_did_not_fail() {
+        for code in [0, 1] {
+            let ended = ran(&format!("echo 'error: not one' >&2; exit {code}"));
+            assert_eq!(ended.result, Ok(()), "{code}");
+            assert_eq!(ended.said, "error: not one\n");
+        }
+    }
 }
