@@ -3,8 +3,8 @@
 use super::keys::{SCENARIO, floor_part};
 use super::screen::{Sandbox, Scenery, Screen, wait_for};
 
-/// The middle of the window.
-const MIDDLE: [u32; 2] = [480, 270];
+/// The middle of what panel, bar and maps leave of the window.
+pub const MIDDLE: [u32; 2] = [509, 300];
 /// A place in the scene from which the mouse may be dragged.
 const SCENE: [u32; 2] = [560, 200];
 /// The mouse, which is drawn, too, in a part of the scene that is not looked at, and not on the divider.
@@ -47,7 +47,7 @@ fn the_camera_turns_flies_and_comes_back_and_two_settings_are_seen_beside_each_o
     let Some(screen) = Screen::start() else { return };
     // A hose that is shut: all that changes is where it is seen from.
     let scenery = Scenery::new(&SCENARIO.replace("rate: 500.0", "rate: 0.0"));
-    scenery.remember("(panel: \"Compare\", tool: Probe)");
+    scenery.remember("(panel: \"Compare\", tool: Probe, maps: true)");
     let mut sandbox = Sandbox::start_paused(&screen, &scenery);
 
     // In orbit what it looks at stays in the middle, in flight it does not.
@@ -115,7 +115,7 @@ fn compare(screen: &Screen, sandbox: &mut Sandbox, alone: &image::RgbImage) {
     sandbox.click(button(screen));
     sandbox.seen();
     sandbox.xdotool(&ASIDE);
-    // In the middle of what is left by the panel and by the maps, which the probe has opened: columns 340 to 678.
+    // In the middle of what is left by the panel and by the maps: columns 340 to 678.
     let at = wait_for("a divider", || divider(screen));
     assert!(at.abs_diff(509) <= NEAR, "the divider is at {at}");
     // Without panels, of the window: one camera sees the scene as the other one sees the copy.

@@ -1,10 +1,9 @@
 //! Painting a place, looking at its maps, asking what it holds, and taking a stroke back.
 
+use super::camera::MIDDLE;
 use super::keys::{SCENARIO, darker_part};
 use super::screen::{Sandbox, Scenery, Screen, wait_for};
 
-/// The middle of the window, which sees the middle of the floor, where the jet comes down.
-const MIDDLE: [u32; 2] = [480, 270];
 /// Left, top, width and height of what is shown of a map, before anything has been asked.
 const MAP: [u32; 4] = [700, 300, 240, 200];
 /// Maps, by their buttons.
@@ -12,7 +11,7 @@ const ABSORBED: [u32; 2] = [845, 196];
 const SOURCE: [u32; 2] = [856, 223];
 const SNOW: [u32; 2] = [758, 250];
 
-/// What a click with the probe finds.
+/// What a click with the probe finds in the middle of the floor, where the jet comes down.
 fn probe(sandbox: &mut Sandbox) -> String {
     sandbox.answer("probe: ", |sandbox| sandbox.click(MIDDLE))
 }
