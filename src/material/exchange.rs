@@ -5,7 +5,7 @@ use bevy::material::OpaqueRendererMethod;
 use bevy::prelude::*;
 
 use super::uniform::SurfaceLook;
-use super::warm_up::{ShaderChanges, Understudy, part_of, rehearse};
+use super::warm_up::{Rehearsed, ShaderChanges, Understudy, part_of, rehearse};
 use super::{
     ClockBuffer, MatterUniform, PlayedWetMap, PorousExtension, PorousMaterial, StandingWater,
     WeatheredMaterial, WettingTextures,
@@ -90,28 +90,45 @@ fn weathered_base(dry: &StandardMaterial, extension: &PorousExtension) -> Standa
     base
 }
 
-/// Exchanges the material of surfaces that have their maps; also of entities that a glTF scene spawns later.
+/// What tells whether a surface may be exchanged without being lost from sight.
+type Rehearsal = (Option<&'static Rehearsed>, Option<&'static Children>, Has<DryMaterial>);
+
+/// Exchanges the material of surfaces that have their maps; also of entities that a glTF scene spawns later. First the new shader is
+/// compiled, unless another form of it is shown already.
 pub(super) fn exchange_materials(
     mut commands: Commands,
     buffer: Res<ClockBuffer>,
     clock: Res<WeatheringClock>,
     matter: Res<MatterLook>,
+    changes: Res<ShaderChanges>,
     deferred_cameras: Query<(), With<DeferredPrepass>>,
     standard: Res<Assets<StandardMaterial>>,
     mut weathered: ResMut<Assets<WeatheredMaterial>>,
-    new: Query<(Entity, Surface, &MeshMaterial3d<StandardMaterial>), Hittable>,
+    new: Query<(Entity, Surface, &MeshMaterial3d<StandardMaterial>, Rehearsal), Hittable>,
+    understudies: Query<(), With<Understudy>>,
 ) {
-    for (entity, surface, material) in &new {
+    for (entity, surface, material, (rehearsed, children, is_weathered)) in &new {
         let Some(dry) = standard.get(material) else { continue };
         if dry.opaque_render_method != OpaqueRendererMethod::Forward && !deferred_cameras.is_empty() {
             info_once!("weathered surfaces are drawn forward, before cameras with a deferred prepass, too");
         }
         let extension = extension(surface, &buffer, &clock, &matter);
-        let handle = weathered.add(WeatheredMaterial { base: weathered_base(dry, &extension), extension });
+        let mut next = WeatheredMaterial { base: weathered_base(dry, &extension), extension };
+        if let Some(Rehearsed(key)) = rehearsed {
+            // What it has come to need meanwhile is rehearsed next.
+            next.extension.key = *key;
+        } else if *changes == ShaderChanges::WhenCompiled && !is_weathered {
+            let is_rehearsing =
+                |children: &Children| children.iter().any(|child| understudies.contains(child));
+            if !children.is_some_and(is_rehearsing) {
+                rehearse(&mut commands, entity, weathered.add(part_of(next)));
+            }
+            continue;
+        }
         commands
             .entity(entity)
-            .remove::<MeshMaterial3d<StandardMaterial>>()
-            .insert((MeshMaterial3d(handle), DryMaterial(material.0.clone())));
+            .remove::<(MeshMaterial3d<StandardMaterial>, Rehearsed)>()
+            .insert((MeshMaterial3d(weathered.add(next)), DryMaterial(material.0.clone())));
     }
 }
 

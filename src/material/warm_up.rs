@@ -5,6 +5,8 @@
 //! waited for any more, the surface takes over the new shader and the understudy leaves. It casts a shadow where the surface
 //! does, since that has a pipeline of its own for each shader. Of what is blended it shows nothing: twice would be seen.
 //!
+//! So it is with the first shader of a surface, too, which is the dry one's stand-in until then ([`Rehearsed`]).
+//!
 //! Where pipelines are compiled at once there is nothing to wait for, and no understudy.
 
 use std::sync::Arc;
@@ -18,7 +20,7 @@ use bevy::prelude::*;
 use bevy::render::render_resource::PipelineCache;
 use bevy::render::{Render, RenderApp, RenderPlugin, RenderSystems};
 
-use super::WeatheredMaterial;
+use super::{PorousKey, WeatheredMaterial};
 use crate::overlay::Weatherable;
 
 /// A child of a [`Weatherable`] surface that is there for a moment, to have its next shader compiled.
@@ -35,6 +37,10 @@ impl Understudy {
     /// Frames after which it takes over in any case.
     const PATIENCE: u32 = 1200;
 }
+
+/// The first shader of a surface has been compiled, this one: it is not lost from sight when it is exchanged.
+#[derive(Component)]
+pub(super) struct Rehearsed(pub(super) PorousKey);
 
 /// How many pipelines are being made; the same number in the main and in the render world.
 #[derive(Resource, Clone, Default)]
@@ -114,11 +120,14 @@ fn take_over(
         if !compiled && understudy.frames < Understudy::PATIENCE {
             continue;
         }
-        let key = materials.get(next).map(|next| next.extension.key);
-        if let (Some(key), Ok(material)) = (key, surfaces.get(surface.parent()))
-            && let Some(mut material) = materials.get_mut(material)
-        {
-            material.extension.key = key;
+        if let Some(key) = materials.get(next).map(|next| next.extension.key) {
+            if let Ok(material) = surfaces.get(surface.parent()) {
+                if let Some(mut material) = materials.get_mut(material) {
+                    material.extension.key = key;
+                }
+            } else {
+                commands.entity(surface.parent()).try_insert(Rehearsed(key));
+            }
         }
         commands.entity(entity).despawn();
     }
