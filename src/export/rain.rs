@@ -3,6 +3,7 @@
 use bevy::prelude::*;
 
 use super::ExportOptions;
+use crate::collision::MeshTriangles;
 use crate::effect::{DropSizes, EffectTable, WeatherEffect};
 use crate::emitter::{Emitter, EmitterShape, Flow};
 use crate::particle::Lifespan;
@@ -17,10 +18,10 @@ const MOST_PER_SECOND: f32 = 100_000.0;
 /// How often each place is hit, if it takes wider marks to come to that: rain leaves no spots that are dry.
 const HITS: f32 = 8.0;
 
-/// Lowest and highest corner of all meshes.
+/// Lowest and highest corner of all that can be hit; other vertices may lie anywhere.
 pub(super) fn bounds<'a>(meshes: impl Iterator<Item = &'a Mesh>) -> (Vec3, Vec3) {
-    let positions = meshes.filter_map(|mesh| mesh.attribute(Mesh::ATTRIBUTE_POSITION)?.as_float3());
-    let points = positions.flatten().copied().map(Vec3::from_array).filter(|point| point.is_finite());
+    let triangles = meshes.filter_map(|mesh| MeshTriangles::from_mesh(mesh).ok());
+    let points = triangles.flat_map(|triangles| triangles.positions).flatten();
     let all = points.fold(None, |bounds: Option<(Vec3, Vec3)>, point| {
         let (low, high) = bounds.unwrap_or((point, point));
         Some((low.min(point), high.max(point)))
@@ -80,10 +81,24 @@ pub(super) fn add_rain(world: &mut World, (low, high): (Vec3, Vec3), options: &E
 
 #[cfg(test)]
 mod tests {
-    use bevy::asset::AssetPlugin;
+    use bevy::asset::{AssetPlugin, RenderAssetUsages};
+    use bevy::mesh::{Indices, PrimitiveTopology};
 
     use super::*;
     use crate::replay::{headless, task_pools};
+
+    #[test]
+    fn it_rains_on_what_can_be_hit() {
+        let far = [1.0e5f32; 3];
+        let points = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.5, 1.0], [0.0, 0.5, 1.0], far];
+        let mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
+            .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, points)
+            .with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, vec![[0.0f32; 2]; 5])
+            // The last one has no area.
+            .with_inserted_indices(Indices::U32(vec![0, 1, 2, 0, 2, 3, 4, 4, 4]));
+        assert_eq!(bounds([&mesh].into_iter()), (Vec3::ZERO, Vec3::new(1.0, 0.5, 1.0)));
+        assert_eq!(bounds(std::iter::empty()), (Vec3::ZERO, Vec3::ZERO));
+    }
 
     #[test]
     fn the_sky_reaches_over_what_the_wind_blows_in() {
