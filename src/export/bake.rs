@@ -6,6 +6,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use bevy::mesh::Mesh;
+
 use super::document::{Document, number};
 use super::look::WetModel;
 use super::paint::{self, Source};
@@ -16,6 +18,7 @@ use super::soaked::Soaked;
 use super::texture::Pictures;
 use super::write::Writer;
 use super::{BakedSurface, ExportError, ExportOptions, ExportReport};
+use crate::collision::{MeshTriangles, TriangleError};
 use crate::matter::MatterLook;
 use crate::output::{refuse_file, temporary_beside, write_atomic};
 use crate::replay::{Progress, SurfaceMaps, write_maps};
@@ -56,15 +59,7 @@ pub fn bake(
 ) -> Result<Export, ExportError> {
     options.check()?;
     let document = Document::open(file)?;
-    let surfaces = surfaces(&document, options)?;
-    let exposed: Vec<_> = surfaces
-        .iter()
-        .map(|Surface { place, shape, .. }| Exposed {
-            name: place.name.clone(),
-            mesh: shape.world_mesh(&place.world_from_mesh),
-            material: options.material,
-        })
-        .collect();
+    let (surfaces, exposed) = surfaces(&document, options)?;
     let failed = |number: usize, source| {
         let surface = surfaces.get(number).map(|surface| surface.place.name.clone()).unwrap_or_default();
         ExportError::Surface { path: file.into(), surface, source }
@@ -101,8 +96,11 @@ pub(super) fn write_wet(
     Ok(BakedSurface::new(place, shape, soaked, maps, size))
 }
 
-/// All surfaces of a scene. Primitives without area are left out.
-fn surfaces(document: &Document, options: &ExportOptions) -> Result<Vec<Surface>, ExportError> {
+/// All surfaces of a scene, and the same in the world. Primitives without area are left out.
+fn surfaces(
+    document: &Document,
+    options: &ExportOptions,
+) -> Result<(Vec<Surface>, Vec<Exposed>), ExportError> {
     let places = document.places()?;
     let (each, path) = (u64::from(options.map_size).pow(2), || document.path.clone());
     let texels = each * places.len() as u64;
@@ -111,7 +109,7 @@ fn surfaces(document: &Document, options: &ExportOptions) -> Result<Vec<Surface>
         return Err(ExportError::TooMany { path: path(), what, value: texels, max: MAX_MAP_TEXELS });
     }
     let mut shapes: BTreeMap<(usize, usize), Option<Arc<Shape>>> = BTreeMap::new();
-    let (mut pictures, mut surfaces) = (Pictures::default(), Vec::new());
+    let (mut pictures, mut surfaces, mut exposed) = (Pictures::default(), Vec::new(), Vec::new());
     for place in places {
         let key = (place.mesh, place.primitive);
         let shape = match shapes.get(&key) {
@@ -123,11 +121,22 @@ fn surfaces(document: &Document, options: &ExportOptions) -> Result<Vec<Surface>
             }
         };
         let Some(shape) = shape else { continue };
+        let mesh = shape.world_mesh(&place.world_from_mesh);
+        if is_flattened(&mesh) {
+            continue;
+        }
+        exposed.push(Exposed { name: place.name.clone(), mesh, material: options.material });
         let primitive = &document.entry("meshes", place.mesh)?["primitives"][place.primitive];
         let source = document.source(number(&primitive["material"]), &mut pictures)?;
         surfaces.push(Surface { place, shape, source });
     }
-    if surfaces.is_empty() { Err(ExportError::NoMesh { path: path() }) } else { Ok(surfaces) }
+    if surfaces.is_empty() { Err(ExportError::NoMesh { path: path() }) } else { Ok((surfaces, exposed)) }
+}
+
+/// Whether a node has scaled a mesh to nothing: so scenes hide things.
+fn is_flattened(mesh: &Mesh) -> bool {
+    let triangles = MeshTriangles::from_mesh(mesh);
+    matches!(triangles, Err(TriangleError::Empty(report)) if report.degenerate == report.total)
 }
 
 /// Texels along each side of the textures of a surface with maps of this size.
