@@ -11,7 +11,7 @@ use crate::weather::Weather;
 /// How a scene is rained on and baked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExportOptions {
-    /// Water on level ground, mm/h, 0.1 to 300.
+    /// Water on level ground, mm/h, 0.1 to 300; less over a scene of kilometres.
     pub rain_mm_per_h: f32,
     /// How long it rains, minutes, above 0 and up to [`Self::MAX_MINUTES`].
     pub minutes: f32,

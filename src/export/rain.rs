@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 
-use super::ExportOptions;
+use super::{ExportError, ExportOptions};
 use crate::collision::MeshTriangles;
 use crate::effect::{DropSizes, EffectTable, WeatherEffect};
 use crate::emitter::{Emitter, EmitterShape, Flow};
@@ -29,8 +29,13 @@ pub(super) fn bounds<'a>(meshes: impl Iterator<Item = &'a Mesh>) -> (Vec3, Vec3)
     all.unwrap_or((Vec3::ZERO, Vec3::ZERO))
 }
 
-/// A sky over all of the scene, and over whatever the wind blows onto it.
-pub(super) fn add_rain(world: &mut World, (low, high): (Vec3, Vec3), options: &ExportOptions) {
+/// A sky over all of the scene, and over whatever the wind blows onto it. An error if it is so large that particles would not
+/// carry all of its rain.
+pub(super) fn add_rain(
+    world: &mut World,
+    (low, high): (Vec3, Vec3),
+    options: &ExportOptions,
+) -> Result<(), ExportError> {
     let mut effect = options.effect.clone();
     if let DropSizes::MarshallPalmer(_) = effect.drops {
         effect.drops = DropSizes::MarshallPalmer(options.rain_mm_per_h.clamp(0.1, 300.0));
@@ -51,6 +56,14 @@ pub(super) fn add_rain(world: &mut World, (low, high): (Vec3, Vec3), options: &E
     let area = 4.0 * half_size.element_product();
     // No particle holds more, so a large scene takes more of them.
     let least = options.rain_mm_per_h * area * 1.0e6 / 3600.0 / WeatherEffect::MAX_VOLUME_MM3;
+    if least > MOST_PER_SECOND {
+        let most = options.rain_mm_per_h * (MOST_PER_SECOND / least);
+        return Err(ExportError::Option {
+            option: "rain",
+            value: options.rain_mm_per_h.to_string(),
+            expected: format!("at most {most:.3} under a sky of {area:.0} m² (lengths of a glTF are metres)"),
+        });
+    }
     let mut emitter = Emitter {
         rate: (options.particles_per_second * crowd).max(least).min(MOST_PER_SECOND),
         shape: EmitterShape::Sky { half_size },
@@ -77,6 +90,7 @@ pub(super) fn add_rain(world: &mut World, (low, high): (Vec3, Vec3), options: &E
         Transform::from_translation(place),
         GlobalTransform::from_translation(place),
     ));
+    Ok(())
 }
 
 #[cfg(test)]
@@ -106,7 +120,7 @@ mod tests {
             headless(task_pools(None), AssetPlugin { watch_for_changes_override: Some(false), ..default() });
         let mut options = ExportOptions::default();
         options.weather.wind = Vec3::new(3.0, 0.0, 0.0);
-        add_rain(app.world_mut(), (Vec3::ZERO, Vec3::new(2.0, 1.0, 2.0)), &options);
+        add_rain(app.world_mut(), (Vec3::ZERO, Vec3::new(2.0, 1.0, 2.0)), &options).unwrap();
         let world = app.world_mut();
         let mut query = world.query::<(&Emitter, &Transform)>();
         let (emitter, transform) = query.single(world).unwrap();
@@ -126,7 +140,7 @@ mod tests {
         let mut app =
             headless(task_pools(None), AssetPlugin { watch_for_changes_override: Some(false), ..default() });
         let options = ExportOptions { minutes: 30.0, ..ExportOptions::default() };
-        add_rain(app.world_mut(), (Vec3::ZERO, Vec3::new(1000.0, 10.0, 1000.0)), &options);
+        add_rain(app.world_mut(), (Vec3::ZERO, Vec3::new(1000.0, 10.0, 1000.0)), &options).unwrap();
         let world = app.world_mut();
         let mut query = world.query::<&Emitter>();
         let emitter = query.single(world).unwrap().clone();
@@ -139,5 +153,17 @@ mod tests {
         assert_eq!(effect.stamp_speed, Some(0.0));
         let rain = emitter.particle_mm3(effect) * emitter.rate / 1000.5f32.powi(2);
         assert!((rain - 1.0e7 / 3600.0).abs() < 3.0, "{rain}");
+    }
+
+    #[test]
+    fn more_rain_than_particles_carry_is_refused() {
+        let mut app =
+            headless(task_pools(None), AssetPlugin { watch_for_changes_override: Some(false), ..default() });
+        let scene = (Vec3::ZERO, Vec3::new(20_000.0, 10.0, 20_000.0));
+        let mut options = ExportOptions { rain_mm_per_h: 100.0, ..ExportOptions::default() };
+        let error = add_rain(app.world_mut(), scene, &options).unwrap_err().to_string();
+        assert!(error.contains("`rain`") && error.contains("at most 0.900"), "{error}");
+        options.rain_mm_per_h = 0.89;
+        add_rain(app.world_mut(), scene, &options).unwrap();
     }
 }

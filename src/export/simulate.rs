@@ -82,7 +82,7 @@ pub(super) fn simulate(
         ));
     }
     wait_until_ready(&mut app, failed)?;
-    add_rain(app.world_mut(), bounds(exposed.iter().map(|surface| &surface.mesh)), options);
+    add_rain(app.world_mut(), bounds(exposed.iter().map(|surface| &surface.mesh)), options)?;
 
     let ticks = options.ticks();
     let mut tick = 0;
