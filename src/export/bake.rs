@@ -148,17 +148,29 @@ pub(super) fn texture_size(source: &Source, wanted: Option<u32>, map_size: u32) 
     })
 }
 
+fn scene_file(stem: &str) -> String {
+    format!("{stem}_weathered.glb")
+}
+
 impl Export {
-    /// Checks that a folder can be written into or, if it is not there, that it can be made: better before a long run than
-    /// after it. Nothing is left of the check.
+    /// Checks that a folder can be written into or, if it is not there, that it can be made, and that a file of the name for
+    /// this stem can be in it: better before a long run than after it. Nothing is left of the check.
     ///
     /// # Errors
-    /// [`ExportError::Write`] with the folder.
-    pub fn check_folder(folder: &Path) -> Result<(), ExportError> {
+    /// [`ExportError::Write`] with the folder or the file.
+    pub fn check_folder(folder: &Path, stem: &str) -> Result<(), ExportError> {
         // The nearest that there is, which has to be a folder.
         let there = folder.ancestors().find(|path| path.exists()).unwrap_or(Path::new("."));
         let writable = refuse_file(there).and_then(|()| temporary_beside(&there.join("report.json")));
-        writable.map(drop).map_err(|source| ExportError::Write { path: folder.into(), source })
+        writable.map(drop).map_err(|source| ExportError::Write { path: folder.into(), source })?;
+        let scene = scene_file(stem);
+        match fs::symlink_metadata(there.join(&scene)) {
+            // Too long.
+            Err(source) if source.kind() == io::ErrorKind::InvalidFilename => {
+                Err(ExportError::Write { path: folder.join(scene), source })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Writes `<stem>_weathered.glb`, `maps/<surface>_*.png` as a replay does, and, when all of them are there, `report.json`.
@@ -168,7 +180,7 @@ impl Export {
     /// # Errors
     /// [`ExportError::Write`], [`ExportError::Replay`] with the file.
     pub fn write(&self, folder: &Path, stem: &str) -> Result<[PathBuf; 2], ExportError> {
-        let [scene, report] = [folder.join(format!("{stem}_weathered.glb")), folder.join("report.json")];
+        let [scene, report] = [folder.join(scene_file(stem)), folder.join("report.json")];
         let write = |path: &Path, bytes: &[u8]| {
             write_atomic(path, bytes).map_err(|source| ExportError::Write { path: path.into(), source })
         };

@@ -273,6 +273,10 @@ fn what_cannot_be_baked_is_named_and_nothing_is_written() {
     std::fs::write(folder.path().join("text.glb"), "no scene").unwrap();
     std::fs::write(folder.path().join("torn.glb"), &scene().glb()[..600]).unwrap();
     scene().write(folder.path());
+    // A name that leaves no room for what is added to it.
+    let long = format!("{}.glb", "x".repeat(245));
+    std::fs::write(folder.path().join(&long), scene().glb()).unwrap();
+    refuse(folder.path(), &long, "_weathered.glb");
     for (arguments, named) in [
         ("nowhere.glb", "nowhere.glb"),
         ("text.glb", "text.glb"),
