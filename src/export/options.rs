@@ -33,7 +33,8 @@ pub struct ExportOptions {
     pub particles_per_second: f32,
     /// Seed of the rain.
     pub seed: u64,
-    /// Threads to compute ticks with; all cores if `None`. The first app of a process decides for all that follow.
+    /// Threads to compute ticks with, 1 to [`Self::MAX_THREADS`]; all cores if `None`. The first app of a process decides for
+    /// all that follow.
     pub threads: Option<usize>,
 }
 
@@ -67,6 +68,8 @@ impl ExportOptions {
     pub const MAX_MINUTES: f32 = 1440.0;
     /// The largest texture, texels along each side.
     pub const MAX_TEXTURE_SIZE: u32 = 8192;
+    /// The most threads; no system starts any number of them.
+    pub const MAX_THREADS: usize = 1024;
 
     /// Ticks that it rains.
     pub(super) fn ticks(&self) -> u32 {
@@ -119,8 +122,10 @@ impl ExportOptions {
         if !self.map_size.is_multiple_of(TILE_SIZE) {
             return Err(wrong("size", self.map_size.to_string(), format!("a multiple of {TILE_SIZE}")));
         }
-        if self.threads == Some(0) {
-            return Err(wrong("threads", "0".into(), "at least 1".into()));
+        if let Some(threads) = self.threads
+            && !(1..=Self::MAX_THREADS).contains(&threads)
+        {
+            return Err(wrong("threads", threads.to_string(), format!("1 to {}", Self::MAX_THREADS)));
         }
         Ok(self.effect.validate()?)
     }
@@ -141,7 +146,7 @@ mod tests {
     #[test]
     fn what_is_out_of_range_is_named() {
         type Edit = fn(&mut ExportOptions);
-        let edits: [(Edit, &str); 8] = [
+        let edits: [(Edit, &str); 9] = [
             (|options| options.rain_mm_per_h = 0.0, "`rain`"),
             (|options| options.minutes = f32::NAN, "`minutes`"),
             (|options| options.particles_per_second = -1.0, "`particles`"),
@@ -150,6 +155,7 @@ mod tests {
             (|options| options.texture_size = Some(1), "`texture-size`"),
             (|options| options.tick_hz = 0, "`hz`"),
             (|options| options.threads = Some(0), "`threads`"),
+            (|options| options.threads = Some(1025), "1 to 1024"),
         ];
         for (edit, named) in edits {
             let mut options = ExportOptions::default();

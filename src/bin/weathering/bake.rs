@@ -50,7 +50,7 @@ pub struct BakeArgs {
     /// Seed: another one, other drops
     #[arg(long, default_value_t = ExportOptions::default().seed, allow_negative_numbers = true)]
     pub seed: u64,
-    /// Threads to compute ticks with [default: all cores]
+    /// Threads to compute ticks with, 1 to 1024 [default: all cores]
     #[arg(long, allow_negative_numbers = true)]
     pub threads: Option<usize>,
 }
