@@ -64,7 +64,7 @@ pub fn bake(
         let surface = surfaces.get(number).map(|surface| surface.place.name.clone()).unwrap_or_default();
         ExportError::Surface { path: file.into(), surface, source }
     };
-    let outcome = simulate(&exposed, options, failed, progress)?;
+    let outcome = simulate(exposed, options, failed, progress)?;
 
     let model = WetModel::new(&options.material, MatterLook::default());
     let places: Vec<_> = surfaces.iter().map(|surface| &surface.place).collect();
