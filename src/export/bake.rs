@@ -6,6 +6,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use bevy::mesh::Mesh;
+
 use super::document::{Document, number};
 use super::look::WetModel;
 use super::paint::{self, Source};
@@ -16,6 +18,7 @@ use super::soaked::Soaked;
 use super::texture::Pictures;
 use super::write::Writer;
 use super::{BakedSurface, ExportError, ExportOptions, ExportReport};
+use crate::collision::{MeshTriangles, TriangleError};
 use crate::matter::MatterLook;
 use crate::output::{refuse_file, temporary_beside, write_atomic};
 use crate::replay::{Progress, SurfaceMaps, write_maps};
@@ -56,20 +59,12 @@ pub fn bake(
 ) -> Result<Export, ExportError> {
     options.check()?;
     let document = Document::open(file)?;
-    let surfaces = surfaces(&document, options)?;
-    let exposed: Vec<_> = surfaces
-        .iter()
-        .map(|Surface { place, shape, .. }| Exposed {
-            name: place.name.clone(),
-            mesh: shape.world_mesh(&place.world_from_mesh),
-            material: options.material,
-        })
-        .collect();
+    let (surfaces, exposed) = surfaces(&document, options)?;
     let failed = |number: usize, source| {
         let surface = surfaces.get(number).map(|surface| surface.place.name.clone()).unwrap_or_default();
         ExportError::Surface { path: file.into(), surface, source }
     };
-    let outcome = simulate(&exposed, options, failed, progress)?;
+    let outcome = simulate(exposed, options, failed, progress)?;
 
     let model = WetModel::new(&options.material, MatterLook::default());
     let places: Vec<_> = surfaces.iter().map(|surface| &surface.place).collect();
@@ -101,8 +96,11 @@ pub(super) fn write_wet(
     Ok(BakedSurface::new(place, shape, soaked, maps, size))
 }
 
-/// All surfaces of a scene. Primitives without area are left out.
-fn surfaces(document: &Document, options: &ExportOptions) -> Result<Vec<Surface>, ExportError> {
+/// All surfaces of a scene, and the same in the world. Primitives without area are left out.
+fn surfaces(
+    document: &Document,
+    options: &ExportOptions,
+) -> Result<(Vec<Surface>, Vec<Exposed>), ExportError> {
     let places = document.places()?;
     let (each, path) = (u64::from(options.map_size).pow(2), || document.path.clone());
     let texels = each * places.len() as u64;
@@ -111,7 +109,7 @@ fn surfaces(document: &Document, options: &ExportOptions) -> Result<Vec<Surface>
         return Err(ExportError::TooMany { path: path(), what, value: texels, max: MAX_MAP_TEXELS });
     }
     let mut shapes: BTreeMap<(usize, usize), Option<Arc<Shape>>> = BTreeMap::new();
-    let (mut pictures, mut surfaces) = (Pictures::default(), Vec::new());
+    let (mut pictures, mut surfaces, mut exposed) = (Pictures::default(), Vec::new(), Vec::new());
     for place in places {
         let key = (place.mesh, place.primitive);
         let shape = match shapes.get(&key) {
@@ -123,11 +121,22 @@ fn surfaces(document: &Document, options: &ExportOptions) -> Result<Vec<Surface>
             }
         };
         let Some(shape) = shape else { continue };
+        let mesh = shape.world_mesh(&place.world_from_mesh);
+        if is_flattened(&mesh) {
+            continue;
+        }
+        exposed.push(Exposed { name: place.name.clone(), mesh, material: options.material });
         let primitive = &document.entry("meshes", place.mesh)?["primitives"][place.primitive];
         let source = document.source(number(&primitive["material"]), &mut pictures)?;
         surfaces.push(Surface { place, shape, source });
     }
-    if surfaces.is_empty() { Err(ExportError::NoMesh { path: path() }) } else { Ok(surfaces) }
+    if surfaces.is_empty() { Err(ExportError::NoMesh { path: path() }) } else { Ok((surfaces, exposed)) }
+}
+
+/// Whether a node has scaled a mesh to nothing: so scenes hide things.
+fn is_flattened(mesh: &Mesh) -> bool {
+    let triangles = MeshTriangles::from_mesh(mesh);
+    matches!(triangles, Err(TriangleError::Empty(report)) if report.degenerate == report.total)
 }
 
 /// Texels along each side of the textures of a surface with maps of this size.
@@ -139,17 +148,29 @@ pub(super) fn texture_size(source: &Source, wanted: Option<u32>, map_size: u32) 
     })
 }
 
+fn scene_file(stem: &str) -> String {
+    format!("{stem}_weathered.glb")
+}
+
 impl Export {
-    /// Checks that a folder can be written into or, if it is not there, that it can be made: better before a long run than
-    /// after it. Nothing is left of the check.
+    /// Checks that a folder can be written into or, if it is not there, that it can be made, and that a file of the name for
+    /// this stem can be in it: better before a long run than after it. Nothing is left of the check.
     ///
     /// # Errors
-    /// [`ExportError::Write`] with the folder.
-    pub fn check_folder(folder: &Path) -> Result<(), ExportError> {
+    /// [`ExportError::Write`] with the folder or the file.
+    pub fn check_folder(folder: &Path, stem: &str) -> Result<(), ExportError> {
         // The nearest that there is, which has to be a folder.
         let there = folder.ancestors().find(|path| path.exists()).unwrap_or(Path::new("."));
         let writable = refuse_file(there).and_then(|()| temporary_beside(&there.join("report.json")));
-        writable.map(drop).map_err(|source| ExportError::Write { path: folder.into(), source })
+        writable.map(drop).map_err(|source| ExportError::Write { path: folder.into(), source })?;
+        let scene = scene_file(stem);
+        match fs::symlink_metadata(there.join(&scene)) {
+            // Too long.
+            Err(source) if source.kind() == io::ErrorKind::InvalidFilename => {
+                Err(ExportError::Write { path: folder.join(scene), source })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Writes `<stem>_weathered.glb`, `maps/<surface>_*.png` as a replay does, and, when all of them are there, `report.json`.
@@ -159,7 +180,7 @@ impl Export {
     /// # Errors
     /// [`ExportError::Write`], [`ExportError::Replay`] with the file.
     pub fn write(&self, folder: &Path, stem: &str) -> Result<[PathBuf; 2], ExportError> {
-        let [scene, report] = [folder.join(format!("{stem}_weathered.glb")), folder.join("report.json")];
+        let [scene, report] = [folder.join(scene_file(stem)), folder.join("report.json")];
         let write = |path: &Path, bytes: &[u8]| {
             write_atomic(path, bytes).map_err(|source| ExportError::Write { path: path.into(), source })
         };

@@ -40,7 +40,7 @@ pub enum ExportError {
         reason: String,
     },
     /// Its texture coordinates are not unique, and cannot be made so.
-    #[error("{}: `{surface}`: {source}", .path.display())]
+    #[error("{}: `{surface}`: {source}{}", .path.display(), size_option(.source))]
     Unwrap {
         /// The file.
         path: PathBuf,
@@ -109,4 +109,30 @@ pub enum ExportError {
         /// How long it was waited for.
         seconds: u64,
     },
+}
+
+/// What `map_size` is called here, if it is too small.
+fn size_option(error: &UnwrapError) -> &'static str {
+    match error {
+        UnwrapError::MapTooSmall { .. } | UnwrapError::DoesNotFit { .. } => {
+            " (the size of maps is option `size`)"
+        }
+        _ => "",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_fit_names_the_option_that_helps() {
+        let text = |source| {
+            ExportError::Unwrap { path: "a.glb".into(), surface: "leaves".into(), source }.to_string()
+        };
+        let crowd = text(UnwrapError::DoesNotFit { charts: 20_000, map_size: 512 });
+        assert!(crowd.starts_with("a.glb: `leaves`: ") && crowd.contains("option `size`"), "{crowd}");
+        let broken = text(UnwrapError::NoPositions);
+        assert!(!broken.contains("option"), "{broken}");
+    }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use image::{DynamicImage, ImageFormat, Luma, Rgb, Rgba};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::ExportError;
 use super::document::Document;
@@ -12,6 +12,9 @@ use super::scene::vector;
 use super::texture::Pictures;
 use crate::picture::{PictureError, square};
 use crate::replay::SurfaceMaps;
+
+/// Says what a material is like in another way.
+const GLOSS: &str = "KHR_materials_pbrSpecularGlossiness";
 
 /// Numbers of textures: colour, roughness and metallic, normal.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,7 +26,7 @@ pub(super) struct WetTextures {
 
 impl Document {
     /// What a material is like; without one, what the format says. Textures that a plain metallic-roughness renderer does
-    /// not read are left alone.
+    /// not read are left alone, but for the diffuse one of a material that is given by specular and glossiness alone.
     pub(super) fn source(
         &self,
         material: Option<usize>,
@@ -33,16 +36,31 @@ impl Document {
             Some(material) => self.entry("materials", material)?,
             None => &Value::Null,
         };
-        let pbr = &material["pbrMetallicRoughness"];
         let factor = |value: &Value| value.as_f64().unwrap_or(1.0) as f32;
+        let normal_map = pictures.texture(self, &material["normalTexture"])?;
+        let normal_scale = factor(&material["normalTexture"]["scale"]);
+        let pbr = &material["pbrMetallicRoughness"];
+        let gloss = &material["extensions"][GLOSS];
+        // What is there for those who do not know the extension says more of what is read here.
+        if gloss.is_object() && pbr.as_object().is_none_or(Map::is_empty) {
+            return Ok(Source {
+                color: vector(&gloss["diffuseFactor"]).unwrap_or([1.0; 4]),
+                color_map: pictures.texture(self, &gloss["diffuseTexture"])?,
+                roughness: 1.0 - factor(&gloss["glossinessFactor"]),
+                metallic: 0.0,
+                surface_map: None,
+                normal_map,
+                normal_scale,
+            });
+        }
         Ok(Source {
             color: vector(&pbr["baseColorFactor"]).unwrap_or([1.0; 4]),
             color_map: pictures.texture(self, &pbr["baseColorTexture"])?,
             roughness: factor(&pbr["roughnessFactor"]),
             metallic: factor(&pbr["metallicFactor"]),
             surface_map: pictures.texture(self, &pbr["metallicRoughnessTexture"])?,
-            normal_map: pictures.texture(self, &material["normalTexture"])?,
-            normal_scale: factor(&material["normalTexture"]["scale"]),
+            normal_map,
+            normal_scale,
         })
     }
 
@@ -140,7 +158,7 @@ impl Document {
         }
         // It says the same in another way, which would win.
         if let Some(extensions) = wet["extensions"].as_object_mut() {
-            extensions.remove("KHR_materials_pbrSpecularGlossiness");
+            extensions.remove(GLOSS);
         }
         if wet["extensions"].as_object().is_none_or(|extensions| extensions.is_empty()) {
             remove(&mut wet, "extensions");
@@ -193,6 +211,21 @@ mod tests {
         let again = document.source(Some(1), &mut Pictures::default()).unwrap();
         let (color, surface) = (again.color_map.unwrap(), again.surface_map.unwrap());
         assert_eq!((color.set, surface.picture.width, again.roughness), (1, 1, 1.0));
+    }
+
+    #[test]
+    fn specular_and_glossiness_are_no_metal() {
+        let mut document = document();
+        let gloss = json!({ "diffuseFactor": [0.5, 0.25, 0.125, 1.0], "glossinessFactor": 0.25 });
+        document.json["materials"][0] = json!({ "extensions": { GLOSS: gloss } });
+        let look = |document: &Document| {
+            let source = document.source(Some(0), &mut Pictures::default()).unwrap();
+            (source.color, source.roughness, source.metallic)
+        };
+        assert_eq!(look(&document), ([0.5, 0.25, 0.125, 1.0], 0.75, 0.0));
+        // A form without the extension is the one that is read.
+        document.json["materials"][0]["pbrMetallicRoughness"] = json!({ "roughnessFactor": 0.5 });
+        assert_eq!(look(&document), ([1.0; 4], 0.5, 1.0));
     }
 
     #[test]

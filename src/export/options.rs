@@ -12,7 +12,7 @@ use crate::weather::Weather;
 /// How a scene is rained on and baked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExportOptions {
-    /// Water on level ground, mm/h, 0.1 to 300.
+    /// Water on level ground, mm/h, 0.1 to 300; less over a scene of kilometres.
     pub rain_mm_per_h: f32,
     /// How long it rains, minutes, above 0 and up to [`Self::MAX_MINUTES`].
     pub minutes: f32,
@@ -34,8 +34,8 @@ pub struct ExportOptions {
     pub particles_per_second: f32,
     /// Seed of the rain.
     pub seed: u64,
-    /// Threads to compute ticks with, up to [`ReplayOptions::MAX_THREADS`]; all cores if `None`. The first app of a process
-    /// decides for all that follow.
+    /// Threads to compute ticks with, 1 to [`Self::MAX_THREADS`]; all cores if `None`. The first app of a process decides for
+    /// all that follow.
     pub threads: Option<usize>,
 }
 
@@ -69,6 +69,8 @@ impl ExportOptions {
     pub const MAX_MINUTES: f32 = 1440.0;
     /// The largest texture, texels along each side.
     pub const MAX_TEXTURE_SIZE: u32 = 8192;
+    /// The most threads; no system starts any number of them.
+    pub const MAX_THREADS: usize = ReplayOptions::MAX_THREADS;
 
     /// Ticks that it rains.
     pub(super) fn ticks(&self) -> u32 {
@@ -122,13 +124,9 @@ impl ExportOptions {
             return Err(wrong("size", self.map_size.to_string(), format!("a multiple of {TILE_SIZE}")));
         }
         if let Some(threads) = self.threads
-            && !(1..=ReplayOptions::MAX_THREADS).contains(&threads)
+            && !(1..=Self::MAX_THREADS).contains(&threads)
         {
-            return Err(wrong(
-                "threads",
-                threads.to_string(),
-                format!("1 to {}", ReplayOptions::MAX_THREADS),
-            ));
+            return Err(wrong("threads", threads.to_string(), format!("1 to {}", Self::MAX_THREADS)));
         }
         Ok(self.effect.validate()?)
     }
@@ -158,7 +156,7 @@ mod tests {
             (|options| options.texture_size = Some(1), "`texture-size`"),
             (|options| options.tick_hz = 0, "`hz`"),
             (|options| options.threads = Some(0), "`threads`"),
-            (|options| options.threads = Some(20_000), "`threads`"),
+            (|options| options.threads = Some(1025), "1 to 1024"),
         ];
         for (edit, named) in edits {
             let mut options = ExportOptions::default();

@@ -2,7 +2,8 @@
 
 use bevy::prelude::*;
 
-use super::ExportOptions;
+use super::{ExportError, ExportOptions};
+use crate::collision::MeshTriangles;
 use crate::effect::{DropSizes, EffectTable, WeatherEffect};
 use crate::emitter::{Emitter, EmitterShape, Flow};
 use crate::particle::Lifespan;
@@ -17,10 +18,10 @@ const MOST_PER_SECOND: f32 = 100_000.0;
 /// How often each place is hit, if it takes wider marks to come to that: rain leaves no spots that are dry.
 const HITS: f32 = 8.0;
 
-/// Lowest and highest corner of all meshes.
+/// Lowest and highest corner of all that can be hit; other vertices may lie anywhere.
 pub(super) fn bounds<'a>(meshes: impl Iterator<Item = &'a Mesh>) -> (Vec3, Vec3) {
-    let positions = meshes.filter_map(|mesh| mesh.attribute(Mesh::ATTRIBUTE_POSITION)?.as_float3());
-    let points = positions.flatten().copied().map(Vec3::from_array).filter(|point| point.is_finite());
+    let triangles = meshes.filter_map(|mesh| MeshTriangles::from_mesh(mesh).ok());
+    let points = triangles.flat_map(|triangles| triangles.positions).flatten();
     let all = points.fold(None, |bounds: Option<(Vec3, Vec3)>, point| {
         let (low, high) = bounds.unwrap_or((point, point));
         Some((low.min(point), high.max(point)))
@@ -28,8 +29,13 @@ pub(super) fn bounds<'a>(meshes: impl Iterator<Item = &'a Mesh>) -> (Vec3, Vec3)
     all.unwrap_or((Vec3::ZERO, Vec3::ZERO))
 }
 
-/// A sky over all of the scene, and over whatever the wind blows onto it.
-pub(super) fn add_rain(world: &mut World, (low, high): (Vec3, Vec3), options: &ExportOptions) {
+/// A sky over all of the scene, and over whatever the wind blows onto it. An error if it is so large that particles would not
+/// carry all of its rain.
+pub(super) fn add_rain(
+    world: &mut World,
+    (low, high): (Vec3, Vec3),
+    options: &ExportOptions,
+) -> Result<(), ExportError> {
     let mut effect = options.effect.clone();
     if let DropSizes::MarshallPalmer(_) = effect.drops {
         effect.drops = DropSizes::MarshallPalmer(options.rain_mm_per_h.clamp(0.1, 300.0));
@@ -50,6 +56,14 @@ pub(super) fn add_rain(world: &mut World, (low, high): (Vec3, Vec3), options: &E
     let area = 4.0 * half_size.element_product();
     // No particle holds more, so a large scene takes more of them.
     let least = options.rain_mm_per_h * area * 1.0e6 / 3600.0 / WeatherEffect::MAX_VOLUME_MM3;
+    if least > MOST_PER_SECOND {
+        let most = options.rain_mm_per_h * (MOST_PER_SECOND / least);
+        return Err(ExportError::Option {
+            option: "rain",
+            value: options.rain_mm_per_h.to_string(),
+            expected: format!("at most {most:.3} under a sky of {area:.0} m² (lengths of a glTF are metres)"),
+        });
+    }
     let mut emitter = Emitter {
         rate: (options.particles_per_second * crowd).max(least).min(MOST_PER_SECOND),
         shape: EmitterShape::Sky { half_size },
@@ -76,14 +90,29 @@ pub(super) fn add_rain(world: &mut World, (low, high): (Vec3, Vec3), options: &E
         Transform::from_translation(place),
         GlobalTransform::from_translation(place),
     ));
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
-    use bevy::asset::AssetPlugin;
+    use bevy::asset::{AssetPlugin, RenderAssetUsages};
+    use bevy::mesh::{Indices, PrimitiveTopology};
 
     use super::*;
     use crate::replay::{headless, task_pools};
+
+    #[test]
+    fn it_rains_on_what_can_be_hit() {
+        let far = [1.0e5f32; 3];
+        let points = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.5, 1.0], [0.0, 0.5, 1.0], far];
+        let mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
+            .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, points)
+            .with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, vec![[0.0f32; 2]; 5])
+            // The last one has no area.
+            .with_inserted_indices(Indices::U32(vec![0, 1, 2, 0, 2, 3, 4, 4, 4]));
+        assert_eq!(bounds([&mesh].into_iter()), (Vec3::ZERO, Vec3::new(1.0, 0.5, 1.0)));
+        assert_eq!(bounds(std::iter::empty()), (Vec3::ZERO, Vec3::ZERO));
+    }
 
     #[test]
     fn the_sky_reaches_over_what_the_wind_blows_in() {
@@ -91,7 +120,7 @@ mod tests {
             headless(task_pools(None), AssetPlugin { watch_for_changes_override: Some(false), ..default() });
         let mut options = ExportOptions::default();
         options.weather.wind = Vec3::new(3.0, 0.0, 0.0);
-        add_rain(app.world_mut(), (Vec3::ZERO, Vec3::new(2.0, 1.0, 2.0)), &options);
+        add_rain(app.world_mut(), (Vec3::ZERO, Vec3::new(2.0, 1.0, 2.0)), &options).unwrap();
         let world = app.world_mut();
         let mut query = world.query::<(&Emitter, &Transform)>();
         let (emitter, transform) = query.single(world).unwrap();
@@ -111,7 +140,7 @@ mod tests {
         let mut app =
             headless(task_pools(None), AssetPlugin { watch_for_changes_override: Some(false), ..default() });
         let options = ExportOptions { minutes: 30.0, ..ExportOptions::default() };
-        add_rain(app.world_mut(), (Vec3::ZERO, Vec3::new(1000.0, 10.0, 1000.0)), &options);
+        add_rain(app.world_mut(), (Vec3::ZERO, Vec3::new(1000.0, 10.0, 1000.0)), &options).unwrap();
         let world = app.world_mut();
         let mut query = world.query::<&Emitter>();
         let emitter = query.single(world).unwrap().clone();
@@ -124,5 +153,17 @@ mod tests {
         assert_eq!(effect.stamp_speed, Some(0.0));
         let rain = emitter.particle_mm3(effect) * emitter.rate / 1000.5f32.powi(2);
         assert!((rain - 1.0e7 / 3600.0).abs() < 3.0, "{rain}");
+    }
+
+    #[test]
+    fn more_rain_than_particles_carry_is_refused() {
+        let mut app =
+            headless(task_pools(None), AssetPlugin { watch_for_changes_override: Some(false), ..default() });
+        let scene = (Vec3::ZERO, Vec3::new(20_000.0, 10.0, 20_000.0));
+        let mut options = ExportOptions { rain_mm_per_h: 100.0, ..ExportOptions::default() };
+        let error = add_rain(app.world_mut(), scene, &options).unwrap_err().to_string();
+        assert!(error.contains("`rain`") && error.contains("at most 0.900"), "{error}");
+        options.rain_mm_per_h = 0.89;
+        add_rain(app.world_mut(), scene, &options).unwrap();
     }
 }

@@ -133,10 +133,13 @@ pub(super) fn vector<const N: usize>(value: &Value) -> Option<[f32; N]> {
     values.collect::<Option<Vec<_>>>()?.try_into().ok()
 }
 
-/// What of a name can be in the name of a file.
+/// What of a name can be in the name of a file, with room for what comes behind it: those have 255 bytes.
 fn file_name(name: &str) -> String {
+    const MOST_BYTES: usize = 192;
     let plain = |c: char| if c.is_alphanumeric() || matches!(c, '-' | '_') { c } else { '_' };
-    name.chars().take(64).map(plain).collect()
+    let mut kept: String = name.chars().take(64).map(plain).collect();
+    kept.truncate(kept.floor_char_boundary(MOST_BYTES));
+    kept
 }
 
 #[cfg(test)]
@@ -172,6 +175,15 @@ mod tests {
         assert_eq!(found, expected);
         let at = |place: &Place| place.world_from_mesh.transform_point3(Vec3::ONE);
         assert_eq!(at(&places[2]), Vec3::new(2.0, 7.0, -2.0));
+    }
+
+    #[test]
+    fn names_are_short_enough_for_files_in_any_script() {
+        assert_eq!(file_name("a/b c-d_é"), "a_b_c-d_é");
+        assert_eq!(file_name(&"a".repeat(80)).len(), 64);
+        let letter = "\u{20000}";
+        assert_eq!(file_name(&letter.repeat(80)), letter.repeat(48));
+        assert_eq!(file_name(&format!("a{}", letter.repeat(80))).len(), 189);
     }
 
     #[test]

@@ -52,7 +52,7 @@ struct Number(usize);
 
 /// Lets it rain.
 pub(super) fn simulate(
-    exposed: &[Exposed],
+    exposed: Vec<Exposed>,
     options: &ExportOptions,
     failed: impl Fn(usize, TriangleError) -> ExportError,
     mut progress: impl FnMut(Progress),
@@ -68,21 +68,22 @@ pub(super) fn simulate(
     app.finish();
     app.cleanup();
 
+    let scene = bounds(exposed.iter().map(|surface| &surface.mesh));
     let maps = Weatherable { map_size: options.map_size, uv: OverlayUv::Mesh, ..default() };
-    for (number, surface) in exposed.iter().enumerate() {
-        let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(surface.mesh.clone());
+    for (number, Exposed { name, mesh, material }) in exposed.into_iter().enumerate() {
+        let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(mesh);
         app.world_mut().spawn((
-            Name::new(surface.name.clone()),
+            Name::new(name),
             Number(number),
             maps,
-            surface.material,
+            material,
             Mesh3d(mesh),
             Transform::default(),
             GlobalTransform::default(),
         ));
     }
     wait_until_ready(&mut app, failed)?;
-    add_rain(app.world_mut(), bounds(exposed.iter().map(|surface| &surface.mesh)), options);
+    add_rain(app.world_mut(), scene, options)?;
 
     let ticks = options.ticks();
     let mut tick = 0;

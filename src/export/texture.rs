@@ -164,8 +164,9 @@ impl Texture {
                 .map(|(part, high)| if high == 1 { part } else { 1.0 - part })
                 .into_iter()
                 .product::<f32>();
-            let x = self.edges[0].inside(corner.x as i64 + right, self.picture.width);
-            let y = self.edges[1].inside(corner.y as i64 + down, self.picture.height);
+            // The conversion saturates, too.
+            let x = self.edges[0].inside((corner.x as i64).saturating_add(right), self.picture.width);
+            let y = self.edges[1].inside((corner.y as i64).saturating_add(down), self.picture.height);
             let texel = self.picture.texels[y as usize * self.picture.width as usize + x as usize];
             let [red, green, blue, alpha] = texel.map(usize::from);
             let values = [decoding[red], decoding[green], decoding[blue], alpha as f32 / 255.0];
@@ -218,6 +219,16 @@ mod tests {
         assert!((mean[0] - 0.5).abs() < 1e-5 && (mean[1] - 0.5).abs() < 1e-5, "{mean:?}");
         let moved = texture(Edge::Repeat, Affine2::from_translation(Vec2::new(0.5, 0.0)));
         assert_eq!(moved.over(Vec2::splat(0.25), [Vec2::ZERO; 2], &plain())[0], 1.0);
+    }
+
+    #[test]
+    fn uvs_too_large_for_whole_numbers_are_read_somewhere() {
+        for edge in [Edge::Clamp, Edge::Mirror, Edge::Repeat] {
+            for uv in [Vec2::splat(1e25), Vec2::splat(-1e25), Vec2::splat(f32::INFINITY)] {
+                let read = texture(edge, Affine2::IDENTITY).over(uv, [Vec2::X; 2], &plain());
+                assert!(read.iter().all(|value| (0.0..=1.0).contains(value)), "{edge:?} {uv}: {read:?}");
+            }
+        }
     }
 
     #[test]

@@ -87,10 +87,10 @@ pub struct Weatherable {
 #[derive(Reflect, Serialize, Deserialize, JsonSchema, Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[reflect(Default)]
 pub enum OverlayUv {
-    /// Unique ones, if those of the mesh are not: if they tile, lie on each other, or are not there. Then a `UV_1` of the mesh
-    /// that is unique is taken as it is; one that is not is left alone, as something may be drawn by it, and so are uvs that
-    /// cannot be unwrapped, with a warning. Uvs inside 0..1 that do not lie on each other stay, and so do those under
-    /// stamps on the map ([`StampSpace::Map`]): who asks for these wants them in every tile.
+    /// Unique ones, if those of the mesh are not: if they tile, lie on each other or in single points, or are not there. Then a
+    /// `UV_1` of the mesh that is unique is taken as it is; one that is not is left alone, as something may be drawn by it, and
+    /// so are uvs that cannot be unwrapped, with a warning. Uvs inside 0..1 that do not lie on each other stay, and so do those
+    /// under stamps on the map ([`StampSpace::Map`]): who asks for these wants them in every tile.
     #[default]
     Auto,
     /// `UV_0` of the mesh, whatever it is like: what falls on one place of a tiled mesh shows in all its tiles.

@@ -101,7 +101,7 @@ pub fn replay(options: &ReplayOptions, mut progress: impl FnMut(Progress)) -> Re
         SavedScene::check_folder(folder)?;
     }
     if let Some(folder) = &options.export {
-        Export::check_folder(folder)?;
+        Export::check_folder(folder, &options.stem())?;
     }
     let mut earlier = None;
     if let Some(out) = &options.out {

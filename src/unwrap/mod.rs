@@ -1,8 +1,8 @@
 //! Texture coordinates of their own for surfaces whose mesh has none that are unique.
 //!
 //! Maps lie over the uvs of a mesh. Where those tile, or halves of a mesh share them, a drop on one place shows at
-//! another. [`measure_overlap`] finds such meshes, [`unwrapped`] gives them a second set, [`Mesh::ATTRIBUTE_UV_1`], and
-//! leaves the first for textures.
+//! another; where faces are points of a palette, at none. [`shares_texels`] finds such meshes, [`unwrapped`] gives them a
+//! second set, [`Mesh::ATTRIBUTE_UV_1`], and leaves the first for textures.
 //!
 //! Each mesh of a surface that wants it ([`OverlayUv`]) is looked at in the background
 //! ([`unique_uvs`]). What has unique uvs keeps its mesh; what has none shows a copy of it that has, made once for each mesh and

@@ -1,4 +1,4 @@
-//! Whether texture coordinates tile, or lie on each other.
+//! Whether texture coordinates tile, lie on each other, or cover next to nothing of the map.
 
 use bevy::prelude::*;
 
@@ -35,9 +35,28 @@ pub fn measure_overlap(triangles: &MeshTriangles, size: u32) -> UvOverlap {
 }
 
 /// [`UvOverlap::needs_unwrap`] of the same, without looking further than it takes: of many triangles that all lie over the
-/// whole map, a few are enough.
+/// whole map, a few are enough. Also whether part of the surface has no texels to speak of, as where each face is a point of
+/// a palette.
 pub fn shares_texels(triangles: &MeshTriangles, size: u32) -> bool {
-    measure_until(triangles, size, UvOverlap::TOLERANCE).needs_unwrap()
+    is_collapsed(triangles) || measure_until(triangles, size, UvOverlap::TOLERANCE).needs_unwrap()
+}
+
+/// Whether all of a surface lies on next to nothing of the map, or part of it does beside the rest. Such triangles own no
+/// texel, so none of them is seen to lie on another.
+fn is_collapsed(triangles: &MeshTriangles) -> bool {
+    /// Of the map, for a whole surface: 16 x 16 texels of 512 x 512.
+    const SMALLEST: f64 = 1.0 / 1024.0;
+    /// Of a triangle's share of what is used of the map, by its area.
+    const THINNEST: f64 = 1e-4;
+    let sizes = || {
+        triangles.positions.iter().zip(&triangles.uvs).map(|(&[a, b, c], &[u, v, w])| {
+            let (area, on_map) = ((b - a).cross(c - a).length(), (v - u).perp_dot(w - u).abs());
+            (f64::from(area) / 2.0, f64::from(on_map) / 2.0)
+        })
+    };
+    let (area, on_map) = sizes().fold((0.0, 0.0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
+    let thin = sizes().filter(|one| one.1 * area < THINNEST * one.0 * on_map).map(|one| one.0);
+    area > 0.0 && (on_map < SMALLEST || thin.sum::<f64>() > f64::from(UvOverlap::TOLERANCE) * area)
 }
 
 /// Measures until so large a part of the whole map is owned twice.
@@ -195,8 +214,34 @@ mod tests {
     }
 
     #[test]
+    fn faces_that_are_points_of_the_map_share_it() {
+        let with = |uvs: [[Vec2; 3]; 2]| MeshTriangles { uvs: uvs.to_vec(), ..rectangles(&[ALL]) };
+        let [low, high] = [0.1, 0.3].map(Vec2::splat);
+        for uvs in
+            [[[Vec2::ZERO; 3]; 2], [[low; 3], [high; 3]], [[Vec2::ZERO, Vec2::X, Vec2::ONE], [high; 3]]]
+        {
+            assert_eq!(measure_overlap(&with(uvs), SIZE).overlapping, 0.0, "{uvs:?}");
+            assert!(shares_texels(&with(uvs), SIZE), "{uvs:?}");
+        }
+        assert!(shares_texels(&rectangles(&[(Vec2::ZERO, Vec2::splat(0.01))]), SIZE));
+        // An island of an atlas is as good as the whole of it.
+        assert!(!shares_texels(&rectangles(&[(low, high)]), SIZE));
+    }
+
+    #[test]
+    fn a_small_face_without_texels_is_forgiven() {
+        let mut speck = rectangles(&[ALL]);
+        speck.positions.push([Vec3::ZERO, Vec3::X * 0.05, Vec3::Y * 0.05]);
+        speck.uvs.push([Vec2::splat(0.5); 3]);
+        assert!(!shares_texels(&speck, SIZE));
+        speck.positions[2] = [Vec3::ZERO, Vec3::X * 0.5, Vec3::Y * 0.5];
+        assert!(shares_texels(&speck, SIZE));
+    }
+
+    #[test]
     fn nothing_needs_nothing() {
         assert_eq!(measure(&[]), UvOverlap::default());
+        assert!(!shares_texels(&rectangles(&[]), SIZE));
         assert!(!measure(&[(Vec2::ONE, Vec2::ONE)]).needs_unwrap());
     }
 }

@@ -97,7 +97,9 @@ fn collect_moves(
             continue;
         }
         let amounts = water.settle(now, texel);
-        filling |= amounts.film_mm > 0.0 && amounts.pores_mm < 0.999 * capacity;
+        // Pores that have no number for more take up no more.
+        let room = water.texels[texel as usize].pores < u32::MAX;
+        filling |= room && amounts.film_mm > 0.0 && amounts.pores_mm < 0.999 * capacity;
         let own = amounts.pores_mm / capacity;
         if own * capacity < least {
             continue;

@@ -100,8 +100,9 @@ impl Scale {
     }
 
     /// Makes `amounts` the texel's own at `tick`; returns the units that evaporated on the way. What is rounded off stays
-    /// in the film or, if there is none, counts as evaporated: nothing is lost. `jitter`, evenly spread over [0, 1), decides
-    /// which way bytes are rounded: else what changes by less than half a step each time would never change.
+    /// in the film or, if there is none, counts as evaporated: nothing is lost. What is more than pores have a number for stays
+    /// on them as a film. `jitter`, evenly spread over [0, 1), decides which way bytes are rounded: else what changes by less than
+    /// half a step each time would never change.
     pub fn commit(
         &self,
         texel: &mut TexelWater,
@@ -113,9 +114,11 @@ impl Scale {
         let before = texel.total();
         // Rounds, since it is not negative; saturates.
         let units = |mm: f64| (mm.max(0.0) / self.unit_mm + 0.5) as u64;
-        let pores = units(amounts.pores_mm).min(before);
+        let most = u64::from(u32::MAX);
+        let pores = units(amounts.pores_mm).min(before).min(most);
         let gone = before as f64 * self.unit_mm - amounts.film_mm - amounts.pores_mm;
-        let film = if amounts.film_mm > 0.0 { (before - pores).saturating_sub(units(gone)) } else { 0 };
+        let keeps_film = amounts.film_mm > 0.0 || pores == most;
+        let film = if keeps_film { (before - pores).saturating_sub(units(gone)) } else { 0 };
         texel.film = u32::try_from(film).unwrap_or(u32::MAX);
         texel.pores = u32::try_from(pores).unwrap_or(u32::MAX);
         texel.tick = tick;
@@ -157,5 +160,22 @@ mod tests {
         assert_eq!((texel.shown, texel.reserve), (128, 51));
         let gone = scale.commit(&mut texel, Amounts::default(), look, 10, 0.5);
         assert_eq!((texel.total(), gone), (0, 5900));
+    }
+
+    #[test]
+    fn what_pores_have_no_number_for_stays_on_them_and_evaporates_like_the_rest() {
+        let scale = Scale { unit_mm: 1.0e-6, reserve_mm: 0.0 };
+        let mut texel = TexelWater { film: 1_000_000, pores: u32::MAX - 5, tick: 1, ..Default::default() };
+        // All of it is absorbed, and then they dry.
+        let total_mm = texel.total() as f64 * scale.unit_mm;
+        for (tick, gone_mm, left, evaporated) in [
+            (2, 0.0, (999_995, u32::MAX), 0),
+            (3, 0.4, (599_995, u32::MAX), 400_000),
+            (4, 1.4, (0, u32::MAX - 400_005), 1_000_000),
+        ] {
+            let amounts = Amounts { pores_mm: total_mm - gone_mm, ..Default::default() };
+            let gone = scale.commit(&mut texel, amounts, WaterLook::default(), tick, 0.0);
+            assert_eq!(((texel.film, texel.pores), gone), (left, evaporated), "{gone_mm}");
+        }
     }
 }

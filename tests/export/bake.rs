@@ -191,6 +191,17 @@ fn all_water_is_accounted_for_and_the_same_rain_is_the_same_scene() {
 }
 
 #[test]
+fn what_a_node_scales_to_nothing_stays_as_it_is() {
+    let export = baked(|json| json["nodes"][2]["scale"] = json!([0.0, 0.0, 0.0]));
+    let names: Vec<_> = export.report.surfaces.iter().map(|row| row.name.as_str()).collect();
+    assert_eq!(names, ["ground", "wall", "strip"]);
+    let glb = Glb::parse(&export.glb);
+    glb.check();
+    assert_eq!(*primitive(&glb, 2), scene().json["meshes"][0]["primitives"][0]);
+    assert_eq!(wet_material(&glb, 1)["name"], "ground_wet");
+}
+
+#[test]
 fn variants_that_there_were_stay() {
     let export = baked(|json| {
         json["extensionsUsed"] = json!(["KHR_materials_variants"]);
@@ -234,8 +245,9 @@ fn the_program_writes_scene_maps_and_report() {
 fn what_cannot_be_baked_is_named_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
     type Edit = fn(&mut Value);
-    let edits: [(&str, Edit, &str); 8] = [
+    let edits: [(&str, Edit, &str); 9] = [
         ("nothing.glb", |json| json["nodes"] = json!([{}]), "no mesh"),
+        ("hidden.glb", |json| json["nodes"][0]["scale"] = json!([0.0, 0.0, 0.0]), "no mesh"),
         ("escapes.glb", |json| json["images"][0] = json!({ "uri": "../brick.png" }), "outside"),
         ("absolute.glb", |json| json["images"][0] = json!({ "uri": "/brick.png" }), "outside"),
         ("gone.glb", |json| json["images"][0] = json!({ "uri": "brick.png" }), "brick.png"),
@@ -261,6 +273,10 @@ fn what_cannot_be_baked_is_named_and_nothing_is_written() {
     std::fs::write(folder.path().join("text.glb"), "no scene").unwrap();
     std::fs::write(folder.path().join("torn.glb"), &scene().glb()[..600]).unwrap();
     scene().write(folder.path());
+    // A name that leaves no room for what is added to it.
+    let long = format!("{}.glb", "x".repeat(245));
+    std::fs::write(folder.path().join(&long), scene().glb()).unwrap();
+    refuse(folder.path(), &long, "_weathered.glb");
     for (arguments, named) in [
         ("nowhere.glb", "nowhere.glb"),
         ("text.glb", "text.glb"),

@@ -50,7 +50,7 @@ pub struct BakeArgs {
     /// Seed: another one, other drops
     #[arg(long, default_value_t = ExportOptions::default().seed, allow_negative_numbers = true)]
     pub seed: u64,
-    /// Threads to compute ticks with, up to 1024 [default: all cores]
+    /// Threads to compute ticks with, 1 to 1024 [default: all cores]
     #[arg(long, allow_negative_numbers = true)]
     pub threads: Option<usize>,
 }
@@ -83,7 +83,8 @@ pub fn run(arguments: &BakeArgs) -> Result<(), Box<dyn Error>> {
         .into());
     }
     options.check()?;
-    Export::check_folder(&arguments.out)?;
+    let stem = arguments.scene.file_stem().unwrap_or_default().to_string_lossy();
+    Export::check_folder(&arguments.out, &stem)?;
     let bar = ProgressBar::no_length().with_style(
         ProgressStyle::with_template("{bar:40} tick {pos}/{len}, {elapsed} gone, {eta} to go")
             .unwrap_or_else(|_| ProgressStyle::default_bar()),
@@ -93,7 +94,6 @@ pub fn run(arguments: &BakeArgs) -> Result<(), Box<dyn Error>> {
         bar.set_position(progress.tick.into());
     })?;
     bar.finish_and_clear();
-    let stem = arguments.scene.file_stem().unwrap_or_default().to_string_lossy();
     for path in export.write(&arguments.out, &stem)? {
         print(path.display())?;
     }
