@@ -129,10 +129,18 @@ pub fn give_up(world: &mut World) {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use bevy::tasks::AsyncComputeTaskPool;
     use bevy::window::WindowCloseRequested;
+    use bevy_weathering::clock::WeatheringClock;
+    use bevy_weathering::emitter::{EmissionSeed, NewParticles};
+    use bevy_weathering::particle::{ParticleCounts, Particles, WaterCounts};
+    use bevy_weathering::scenario::{Digest, Scenario};
+    use bevy_weathering::weather::{DryingClock, Weather};
 
     use super::super::leave;
+    use super::super::open::Opened;
     use super::super::shortcuts::Shortcuts;
     use super::super::ui::{Help, UiInput};
     use super::*;
@@ -236,6 +244,34 @@ mod tests {
         world.insert_resource(settling());
         give_up(&mut world);
         assert!(!is_busy(&world));
+    }
+
+    #[test]
+    fn what_another_scenario_has_saved_leaves_the_scene_as_it_is() {
+        let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/scenarios");
+        let [open, other] =
+            ["hose.ron", "rain.ron"].map(|name| Scenario::load(&scenarios.join(name)).unwrap());
+        // All that a scene of nothing has.
+        let mut app = App::new();
+        app.init_resource::<Saving>()
+            .init_resource::<WeatheringClock>()
+            .init_resource::<EmissionSeed>()
+            .init_resource::<NewParticles>()
+            .init_resource::<Particles>()
+            .init_resource::<ParticleCounts>()
+            .init_resource::<WaterCounts>()
+            .init_resource::<Digest>()
+            .init_resource::<Weather>()
+            .init_resource::<DryingClock>()
+            .insert_resource(Opened { loaded: open });
+        let world = app.world_mut();
+        let folder = tempfile::tempdir().unwrap();
+        let kept = folder.path().join("kept");
+        SavedScene::capture(world, &other, Vec::new()).write(&kept).unwrap();
+        world.resource_mut::<WeatheringClock>().advance();
+        let refused = steps::begin_restoring(world, &kept).unwrap_err();
+        assert!(refused.contains("saved from another"), "{refused}");
+        assert!(world.resource::<WeatheringClock>().tick() == 1 && !is_busy(world));
     }
 
     #[test]
