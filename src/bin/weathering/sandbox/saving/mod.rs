@@ -139,6 +139,7 @@ mod tests {
     use bevy_weathering::scenario::{Digest, Scenario};
     use bevy_weathering::weather::{DryingClock, Weather};
 
+    use super::super::export::Exporting;
     use super::super::leave;
     use super::super::open::Opened;
     use super::super::shortcuts::Shortcuts;
@@ -152,7 +153,8 @@ mod tests {
             .init_resource::<UiInput>()
             .init_resource::<Help>()
             .init_resource::<Note>()
-            .init_resource::<Saving>();
+            .init_resource::<Saving>()
+            .init_resource::<Exporting>();
         leave::plugin(&mut app);
         app
     }
@@ -167,17 +169,20 @@ mod tests {
     }
 
     #[test]
-    fn a_window_that_is_closed_while_a_scene_is_saved_stays_until_it_is() {
-        let mut app = app();
-        app.insert_resource(settling());
-        close(&mut app);
-        for _ in 0..3 {
-            assert_eq!(app.should_exit(), None);
+    fn a_window_that_is_closed_while_a_scene_is_saved_or_exported_stays_until_it_is() {
+        let cases = [(settling(), Exporting::default()), (Saving(None), Exporting::settling())];
+        for (saving, exporting) in cases {
+            let mut app = app();
+            app.insert_resource(saving).insert_resource(exporting);
+            close(&mut app);
+            for _ in 0..3 {
+                assert_eq!(app.should_exit(), None);
+                app.update();
+            }
+            app.insert_resource(Saving(None)).insert_resource(Exporting::default());
             app.update();
+            assert_eq!(app.should_exit(), Some(AppExit::Success));
         }
-        app.insert_resource(Saving(None));
-        app.update();
-        assert_eq!(app.should_exit(), Some(AppExit::Success));
     }
 
     #[test]
@@ -275,20 +280,31 @@ mod tests {
     }
 
     #[test]
-    fn the_program_does_not_end_before_a_file_that_is_being_written() {
+    fn the_program_does_not_end_before_files_that_are_being_written() {
         let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("late");
-        let to = file.clone();
-        let pool = AsyncComputeTaskPool::get_or_init(Default::default);
-        let task = pool.spawn(async move {
+        let [file, scene] = ["late", "late.glb"].map(|name| folder.path().join(name));
+        let write_late = |to: &Path| {
             std::thread::sleep(std::time::Duration::from_millis(200));
-            std::fs::write(to, "whole").map_err(|source| SaveError::Write { path: "late".into(), source })
+            std::fs::write(to, "whole")
+        };
+        let pool = AsyncComputeTaskPool::get_or_init(Default::default);
+        let to = file.clone();
+        let saved = pool.spawn(async move {
+            write_late(&to).map_err(|source| SaveError::Write { path: "late".into(), source })
+        });
+        let to = scene.clone();
+        let exported = pool.spawn(async move {
+            write_late(&to).unwrap();
+            Ok(to)
         });
         let mut app = app();
-        app.insert_resource(Saving(Some(Step::Writing { folder: folder.path().into(), task })));
+        app.insert_resource(Saving(Some(Step::Writing { folder: folder.path().into(), task: saved })));
+        app.insert_resource(Exporting::writing(exported));
         // In the way of a signal or a lost device, which wait for nothing.
         app.world_mut().write_message(AppExit::error());
         app.update();
-        assert_eq!(std::fs::read_to_string(file).unwrap(), "whole");
+        for file in [file, scene] {
+            assert_eq!(std::fs::read_to_string(file).unwrap(), "whole");
+        }
     }
 }
