@@ -74,6 +74,12 @@ impl Saving {
         matches!(self.0, Some(Step::Settling { .. } | Step::Reading { .. }))
     }
 
+    /// As it is right after the key.
+    #[cfg(test)]
+    pub fn settling() -> Self {
+        Self(Some(Step::Settling { purpose: Purpose::Folder("saved".into()), frames: SETTLE }))
+    }
+
     /// Waits for what is being written; what is not that far yet is given up.
     pub fn finish(&mut self) {
         if let Some(Step::Writing { folder, task }) = self.0.take() {
@@ -164,13 +170,9 @@ mod tests {
         app.update();
     }
 
-    fn settling() -> Saving {
-        Saving(Some(Step::Settling { purpose: Purpose::Folder("saved".into()), frames: SETTLE }))
-    }
-
     #[test]
     fn a_window_that_is_closed_while_a_scene_is_saved_or_exported_stays_until_it_is() {
-        let cases = [(settling(), Exporting::default()), (Saving(None), Exporting::settling())];
+        let cases = [(Saving::settling(), Exporting::default()), (Saving(None), Exporting::settling())];
         for (saving, exporting) in cases {
             let mut app = app();
             app.insert_resource(saving).insert_resource(exporting);
@@ -187,7 +189,7 @@ mod tests {
 
     #[test]
     fn who_insists_leaves_at_once_and_without_anything_to_save_so_does_everyone() {
-        for (saving, times) in [(settling(), 2), (Saving(None), 1)] {
+        for (saving, times) in [(Saving::settling(), 2), (Saving(None), 1)] {
             let mut app = app();
             app.insert_resource(saving);
             for _ in 0..times {
@@ -223,7 +225,7 @@ mod tests {
         // What is being saved is not lost.
         let mut app = self::app();
         app.world_mut().resource_mut::<leave::Unsaved>().0 = true;
-        app.insert_resource(settling());
+        app.insert_resource(Saving::settling());
         app.insert_resource(Shortcuts::of(KeyCode::Escape));
         app.update();
         assert!(app.should_exit().is_none() && is_leaving(&app));
@@ -238,7 +240,7 @@ mod tests {
         assert!(toggle_later(&mut world) && !goes_on_later(&world));
         assert!(toggle_later(&mut world) && goes_on_later(&world));
         // What is saved into a folder stays paused then.
-        world.insert_resource(settling());
+        world.insert_resource(Saving::settling());
         assert!(is_taking(&world) && !toggle_later(&mut world) && !goes_on_later(&world));
     }
 
@@ -246,7 +248,7 @@ mod tests {
     fn of_a_scene_that_another_has_replaced_nothing_is_saved() {
         let mut world = World::new();
         world.init_resource::<Note>();
-        world.insert_resource(settling());
+        world.insert_resource(Saving::settling());
         give_up(&mut world);
         assert!(!is_busy(&world));
     }
