@@ -5,7 +5,7 @@ use std::path::Path;
 use bevy::asset::RenderAssetUsages;
 use bevy::prelude::*;
 
-use super::maps::value;
+use super::maps::{STATE, value};
 use super::{AddedEmitter, SaveError, SavedScene, effects, emitters_in_order, surfaces_in_order};
 use crate::clock::WeatheringClock;
 use crate::effect::EffectTable;
@@ -21,6 +21,19 @@ use crate::weather::DryingClock;
 use crate::wetting::{SurfaceWater, put_matter};
 
 impl SavedScene {
+    /// That it was saved from this scenario: better before a scene is cleared for it than after. `folder` is for messages.
+    ///
+    /// # Errors
+    /// [`SaveError::Value`] if it was saved from another `.ron` file.
+    pub fn check_scenario(&self, scenario: &LoadedScenario, folder: &Path) -> Result<(), SaveError> {
+        if self.state.scenario == scenario.hash {
+            return Ok(());
+        }
+        let expected =
+            format!("{}, the hash of this scenario's .ron file: it was saved from another", scenario.hash);
+        Err(value(&folder.join(STATE), "scenario", &self.state.scenario, expected))
+    }
+
     /// Puts the state into a world whose scenario is ready and has run no tick. `folder` is for messages. If it
     /// [says](Self::has_emitters) what emitters are, those that have been [added](AddedEmitter) to the world make room for its own.
     ///
@@ -32,11 +45,8 @@ impl SavedScene {
         scenario: &LoadedScenario,
         folder: &Path,
     ) -> Result<(), SaveError> {
-        let (state, path) = (&self.state, folder.join("state.ron"));
-        if state.scenario != scenario.hash {
-            let expected = format!("{}, the hash of this scenario's .ron file", scenario.hash);
-            return Err(value(&path, "scenario", &state.scenario, expected));
-        }
+        self.check_scenario(scenario, folder)?;
+        let (state, path) = (&self.state, folder.join(STATE));
         let mut there = emitters_in_order(world);
         let mut settings = None;
         if let Some(kept) = &state.settings {

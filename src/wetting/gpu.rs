@@ -282,6 +282,10 @@ fn extract_tiles(
     let query = query.get_or_insert_with(|| main_world.query());
     for (entity, overlays, mut packed) in query.iter_mut(&mut main_world) {
         let packed = packed.bypass_change_detection();
+        if !overlays.has_room {
+            // Packed for maps that are gone: those that came in their place may have seen no water yet.
+            packed.clear();
+        }
         if packed.tiles.is_empty() {
             continue;
         }
@@ -384,6 +388,26 @@ mod tests {
         }
         assert_eq!(waiting.tiles, [0, 1, 2, 3, 4]);
         assert_eq!((waiting.texels.len(), waiting.matter.len()), (5 * TILE_TEXELS, 5 * TILE_TEXELS));
+    }
+
+    #[test]
+    fn maps_without_room_get_nothing_that_was_packed_for_those_before() {
+        for (has_room, sent) in [(false, 0), (true, 1)] {
+            let mut main = MainWorld::default();
+            let maps = Overlays { has_room, has_matter_room: has_room, ..Overlays::bare(512) };
+            let surface = main.spawn((maps, packed(&[76], 1, true))).id();
+            let mut render = World::new();
+            render.insert_resource(main);
+            render.init_resource::<PendingTiles>();
+            let mut schedule = Schedule::default();
+            schedule.add_systems(extract_tiles);
+            schedule.run(&mut render);
+            let pending = &render.resource::<PendingTiles>().surfaces;
+            assert_eq!(pending.values().map(|waiting| waiting.packed.tiles.len()).sum::<usize>(), sent);
+            // Nor does anything stay behind for later.
+            let left = render.resource::<MainWorld>().get::<PackedTiles>(surface);
+            assert_eq!(left, Some(&PackedTiles::default()));
+        }
     }
 
     #[test]

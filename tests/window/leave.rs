@@ -45,8 +45,12 @@ fn a_scene_that_is_being_saved_is_whole_whenever_the_program_ends() {
     let mut sandbox = Sandbox::start(&screen, &scenery);
     sandbox.key("ctrl+s");
     sandbox.says(&format!("saved {}", saved.display()));
+    // What is being exported is waited for, too.
+    sandbox.key("x");
     sandbox.key("Escape");
     assert!(sandbox.end().success());
+    // The report comes last.
+    assert!(scenery.out().join("export_000/report.json").exists(), "{}", scenery.log());
     assert_eq!(temporaries(&scenery.out()), Vec::<String>::new());
     let last = SavedScene::read(&saved).unwrap();
     let mut on = replay(scenery.scenario(), "--no-render --resume");

@@ -6,11 +6,12 @@
 use std::path::PathBuf;
 
 use bevy::prelude::*;
-use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
+use bevy::tasks::{AsyncComputeTaskPool, Task, block_on, futures::check_ready};
 use bevy_egui::egui;
 use bevy_weathering::export::{ColorReadback, ExportError, Snapshot};
 use bevy_weathering::scenario::ScenarioStatus;
 
+use super::leave::Leaving;
 use super::open::Opened;
 use super::shortcuts::Shortcuts;
 use super::shots::{OutFolder, free_name};
@@ -23,7 +24,7 @@ const SETTLE: u32 = 4;
 
 /// A scene that is being exported.
 #[derive(Resource, Default)]
-struct Exporting(Option<Step>);
+pub struct Exporting(Option<Step>);
 
 enum Step {
     /// So many frames until the maps are read. `goes_on`: time ran before.
@@ -36,6 +37,35 @@ enum Step {
 
 pub fn plugin(app: &mut App) {
     app.init_resource::<Exporting>().add_systems(Update, (key, advance).chain());
+}
+
+impl Exporting {
+    /// A scene is on its way to the disk.
+    pub fn is_exporting(&self) -> bool {
+        self.0.is_some()
+    }
+
+    /// Waits for what is being written; what is not that far yet is given up.
+    pub fn finish(&mut self) {
+        if let Some(Step::Writing(task)) = self.0.take() {
+            match block_on(task) {
+                Ok(scene) => info!("exported {}", scene.display()),
+                Err(error) => error!("{error}"),
+            }
+        }
+    }
+
+    /// As it is right after the key.
+    #[cfg(test)]
+    pub fn settling() -> Self {
+        Self(Some(Step::Settling { frames: SETTLE, goes_on: false }))
+    }
+
+    /// As it is while another thread is at it.
+    #[cfg(test)]
+    pub fn writing(task: Task<Result<PathBuf, ExportError>>) -> Self {
+        Self(Some(Step::Writing(task)))
+    }
 }
 
 /// Whether the scene has to stay as it is.
@@ -148,16 +178,23 @@ fn advance(world: &mut World) {
         Step::Writing(mut task) => match check_ready(&mut task) {
             None => Some(Step::Writing(task)),
             Some(written) => {
-                let mut note = world.resource_mut::<Note>();
                 match written {
-                    Ok(scene) => note.tell(format!("exported {}", scene.display())),
-                    Err(error) => note.complain(error.to_string()),
+                    Ok(scene) => {
+                        world.resource_mut::<Note>().tell(format!("exported {}", scene.display()));
+                    }
+                    Err(error) => fail(world, &error),
                 }
                 None
             }
         },
     };
     world.resource_mut::<Exporting>().0 = next;
+}
+
+/// Whoever was about to leave may want to mend what is wrong first.
+fn fail(world: &mut World, error: &ExportError) {
+    world.resource_mut::<Leaving>().0 = false;
+    world.resource_mut::<Note>().complain(error.to_string());
 }
 
 /// Takes the state, lets time go on, and has the scene made.
@@ -171,7 +208,7 @@ fn write(world: &mut World, colors: &ColorReadback, goes_on: bool) -> Option<Ste
     let snapshot = match taken {
         Ok(snapshot) => snapshot,
         Err(error) => {
-            world.resource_mut::<Note>().complain(error.to_string());
+            fail(world, &error);
             return None;
         }
     };

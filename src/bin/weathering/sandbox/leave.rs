@@ -9,6 +9,7 @@ use bevy::window::WindowCloseRequested;
 use bevy_weathering::record::Recording;
 use bevy_weathering::replay::describe_render_error;
 
+use super::export::Exporting;
 use super::hose::Pointed;
 use super::open::Opened;
 use super::saving::Saving;
@@ -16,7 +17,7 @@ use super::settings::{Settings, Tool};
 use super::shortcuts::Shortcuts;
 use super::ui::{Help, Note, UiInput};
 
-/// The program ends as soon as nothing is being saved.
+/// The program ends as soon as nothing is being saved or exported.
 #[derive(Resource, Default)]
 pub struct Leaving(pub bool);
 
@@ -100,23 +101,30 @@ fn ask(leaving: &mut Leaving, exit: &mut MessageWriter<AppExit>) {
 fn leave(
     leaving: Res<Leaving>,
     saving: Res<Saving>,
+    exporting: Res<Exporting>,
     mut note: ResMut<Note>,
     mut exit: MessageWriter<AppExit>,
 ) {
     if !leaving.0 {
         return;
     }
-    if !saving.is_saving() {
+    if !saving.is_saving() && !exporting.is_exporting() {
         exit.write(AppExit::Success);
     } else if leaving.is_changed() {
-        note.tell("leaves when the scene is saved");
+        let done = if saving.is_saving() { "saved" } else { "exported" };
+        note.tell(format!("leaves when the scene is {done}"));
     }
 }
 
-/// However it ends: the thread that writes would end with the program.
-fn finish_writing(mut exits: MessageReader<AppExit>, mut saving: ResMut<Saving>) {
+/// However it ends: the threads that write would end with the program.
+fn finish_writing(
+    mut exits: MessageReader<AppExit>,
+    mut saving: ResMut<Saving>,
+    mut exporting: ResMut<Exporting>,
+) {
     if exits.read().count() > 0 {
         saving.finish();
+        exporting.finish();
     }
 }
 
@@ -125,6 +133,9 @@ fn give_up(error: &RenderError, main_world: &mut World, _render_world: &mut Worl
     error!("{}; nothing can be drawn any more", describe_render_error(error));
     if let Some(mut saving) = main_world.get_resource_mut::<Saving>() {
         saving.finish();
+    }
+    if let Some(mut exporting) = main_world.get_resource_mut::<Exporting>() {
+        exporting.finish();
     }
     main_world.write_message(AppExit::error());
     RenderErrorPolicy::StopRendering

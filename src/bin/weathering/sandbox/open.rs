@@ -12,6 +12,7 @@ use bevy_weathering::scenario::{
     LoadedScenario, PreparedScenario, Scenario, ScenarioStatus, TextureSpec, switch_scenario,
 };
 
+use super::leave::Leaving;
 use super::ui::Note;
 use super::undo::Undo;
 use super::{export, model, record, saving, split};
@@ -104,7 +105,8 @@ pub fn open(world: &mut World, file: &Path) {
 /// Shows what has been read.
 fn finish(world: &mut World) {
     let Some(coming) = world.resource_mut::<Opening>().0.take() else { return };
-    if !coming.thread.is_finished() {
+    // Whoever leaves wants no other scene any more, but maybe this one saved.
+    if !coming.thread.is_finished() || world.resource::<Leaving>().0 {
         world.resource_mut::<Opening>().0 = Some(coming);
         return;
     }
@@ -166,6 +168,7 @@ fn tell_failure(
 
 #[cfg(test)]
 mod tests {
+    use super::super::saving::Saving;
     use super::*;
 
     #[test]
@@ -181,6 +184,25 @@ mod tests {
         );
         let model = load(&scenarios.join("../models/bunny_1000.glb"), None).unwrap();
         assert!(!is_slow(&model));
+    }
+
+    #[test]
+    fn a_scene_that_comes_while_one_leaves_takes_nothing_from_what_is_being_saved() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/scenarios/hose.ron");
+        let empty = without_content(&load(&file, None).unwrap());
+        let prepared = PreparedScenario::new(empty, false).unwrap();
+        let thread = spawn(move || Ok(prepared));
+        while !thread.is_finished() {
+            std::thread::yield_now();
+        }
+        let mut world = World::new();
+        world.insert_resource(Opening(Some(Coming { file, thread, is_first: false })));
+        world.insert_resource(Leaving(true));
+        world.insert_resource(Saving::settling());
+        finish(&mut world);
+        assert!(world.resource::<Saving>().is_saving());
+        // If the scene cannot be saved, nobody leaves, and the other one comes.
+        assert!(world.resource::<Opening>().file().is_some());
     }
 
     #[test]

@@ -115,7 +115,7 @@ fn press(keys: Res<Shortcuts>, mut commands: Commands) {
 /// Begins to record, or writes what was recorded and ends.
 fn toggle(world: &mut World) {
     if world.contains_resource::<Recording>() {
-        finish(world);
+        end_by_hand(world);
     } else {
         begin(world);
     }
@@ -196,6 +196,14 @@ fn start(world: &mut World, base: LoadedScenario, prepared: PreparedScenario) {
     record::begin(world, base);
     world.insert_resource(LastView::default());
     world.resource_mut::<Note>().tell(told);
+}
+
+/// Ends it, unless it cannot be written: then it goes on, and somebody may make room.
+fn end_by_hand(world: &mut World) {
+    match record::save(world) {
+        Ok(_) => finish(world),
+        Err(error) => world.resource_mut::<Note>().complain(format!("{error}; the recording goes on")),
+    }
 }
 
 /// Writes what is being recorded, if anything is, and ends. What was about to begin does not.
@@ -387,7 +395,7 @@ fn show_bar(ui: &mut egui::Ui, world: &mut World) {
     let (end, is_flawed, is_live) =
         (recording.seconds(), recording.flaws().next().is_some(), recording.is_live());
     if ui.button("End").on_hover_text("Writes what was recorded (F9)").clicked() {
-        finish(world);
+        end_by_hand(world);
         return;
     }
     let text = egui::RichText::new(format!("rec {end:.1} s"));
@@ -426,5 +434,34 @@ pub fn show(ui: &mut egui::Ui, world: &mut World) {
     }
     if ui.button("Write now").on_hover_text("And go on recording").clicked() {
         write(world);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use bevy_weathering::weather::Weather;
+
+    use super::*;
+
+    #[test]
+    fn a_recording_that_cannot_be_written_goes_on() {
+        let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/scenarios/hose.ron");
+        let mut base = Scenario::load(&scenario).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        // Where its folder was there is a file.
+        let place = folder.path().join("recorded_000");
+        std::fs::write(&place, "").unwrap();
+        base.file = place.join("hose_recorded.ron");
+        let mut world = World::new();
+        world.init_resource::<WeatheringClock>();
+        world.init_resource::<Weather>();
+        world.init_resource::<Note>();
+        record::begin(&mut world, base);
+        toggle(&mut world);
+        assert!(world.contains_resource::<Recording>());
+        let (told, is_wrong) = world.resource::<Note>().shown().unwrap();
+        assert!(is_wrong && told.ends_with("the recording goes on"), "{told}");
     }
 }

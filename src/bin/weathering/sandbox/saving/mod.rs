@@ -74,6 +74,12 @@ impl Saving {
         matches!(self.0, Some(Step::Settling { .. } | Step::Reading { .. }))
     }
 
+    /// As it is right after the key.
+    #[cfg(test)]
+    pub fn settling() -> Self {
+        Self(Some(Step::Settling { purpose: Purpose::Folder("saved".into()), frames: SETTLE }))
+    }
+
     /// Waits for what is being written; what is not that far yet is given up.
     pub fn finish(&mut self) {
         if let Some(Step::Writing { folder, task }) = self.0.take() {
@@ -129,10 +135,19 @@ pub fn give_up(world: &mut World) {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use bevy::tasks::AsyncComputeTaskPool;
     use bevy::window::WindowCloseRequested;
+    use bevy_weathering::clock::WeatheringClock;
+    use bevy_weathering::emitter::{EmissionSeed, NewParticles};
+    use bevy_weathering::particle::{ParticleCounts, Particles, WaterCounts};
+    use bevy_weathering::scenario::{Digest, Scenario};
+    use bevy_weathering::weather::{DryingClock, Weather};
 
+    use super::super::export::Exporting;
     use super::super::leave;
+    use super::super::open::Opened;
     use super::super::shortcuts::Shortcuts;
     use super::super::ui::{Help, UiInput};
     use super::*;
@@ -144,7 +159,8 @@ mod tests {
             .init_resource::<UiInput>()
             .init_resource::<Help>()
             .init_resource::<Note>()
-            .init_resource::<Saving>();
+            .init_resource::<Saving>()
+            .init_resource::<Exporting>();
         leave::plugin(&mut app);
         app
     }
@@ -154,27 +170,26 @@ mod tests {
         app.update();
     }
 
-    fn settling() -> Saving {
-        Saving(Some(Step::Settling { purpose: Purpose::Folder("saved".into()), frames: SETTLE }))
-    }
-
     #[test]
-    fn a_window_that_is_closed_while_a_scene_is_saved_stays_until_it_is() {
-        let mut app = app();
-        app.insert_resource(settling());
-        close(&mut app);
-        for _ in 0..3 {
-            assert_eq!(app.should_exit(), None);
+    fn a_window_that_is_closed_while_a_scene_is_saved_or_exported_stays_until_it_is() {
+        let cases = [(Saving::settling(), Exporting::default()), (Saving(None), Exporting::settling())];
+        for (saving, exporting) in cases {
+            let mut app = app();
+            app.insert_resource(saving).insert_resource(exporting);
+            close(&mut app);
+            for _ in 0..3 {
+                assert_eq!(app.should_exit(), None);
+                app.update();
+            }
+            app.insert_resource(Saving(None)).insert_resource(Exporting::default());
             app.update();
+            assert_eq!(app.should_exit(), Some(AppExit::Success));
         }
-        app.insert_resource(Saving(None));
-        app.update();
-        assert_eq!(app.should_exit(), Some(AppExit::Success));
     }
 
     #[test]
     fn who_insists_leaves_at_once_and_without_anything_to_save_so_does_everyone() {
-        for (saving, times) in [(settling(), 2), (Saving(None), 1)] {
+        for (saving, times) in [(Saving::settling(), 2), (Saving(None), 1)] {
             let mut app = app();
             app.insert_resource(saving);
             for _ in 0..times {
@@ -210,7 +225,7 @@ mod tests {
         // What is being saved is not lost.
         let mut app = self::app();
         app.world_mut().resource_mut::<leave::Unsaved>().0 = true;
-        app.insert_resource(settling());
+        app.insert_resource(Saving::settling());
         app.insert_resource(Shortcuts::of(KeyCode::Escape));
         app.update();
         assert!(app.should_exit().is_none() && is_leaving(&app));
@@ -225,7 +240,7 @@ mod tests {
         assert!(toggle_later(&mut world) && !goes_on_later(&world));
         assert!(toggle_later(&mut world) && goes_on_later(&world));
         // What is saved into a folder stays paused then.
-        world.insert_resource(settling());
+        world.insert_resource(Saving::settling());
         assert!(is_taking(&world) && !toggle_later(&mut world) && !goes_on_later(&world));
     }
 
@@ -233,26 +248,65 @@ mod tests {
     fn of_a_scene_that_another_has_replaced_nothing_is_saved() {
         let mut world = World::new();
         world.init_resource::<Note>();
-        world.insert_resource(settling());
+        world.insert_resource(Saving::settling());
         give_up(&mut world);
         assert!(!is_busy(&world));
     }
 
     #[test]
-    fn the_program_does_not_end_before_a_file_that_is_being_written() {
+    fn what_another_scenario_has_saved_leaves_the_scene_as_it_is() {
+        let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/scenarios");
+        let [open, other] =
+            ["hose.ron", "rain.ron"].map(|name| Scenario::load(&scenarios.join(name)).unwrap());
+        // All that a scene of nothing has.
+        let mut app = App::new();
+        app.init_resource::<Saving>()
+            .init_resource::<WeatheringClock>()
+            .init_resource::<EmissionSeed>()
+            .init_resource::<NewParticles>()
+            .init_resource::<Particles>()
+            .init_resource::<ParticleCounts>()
+            .init_resource::<WaterCounts>()
+            .init_resource::<Digest>()
+            .init_resource::<Weather>()
+            .init_resource::<DryingClock>()
+            .insert_resource(Opened { loaded: open });
+        let world = app.world_mut();
         let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("late");
-        let to = file.clone();
-        let pool = AsyncComputeTaskPool::get_or_init(Default::default);
-        let task = pool.spawn(async move {
+        let kept = folder.path().join("kept");
+        SavedScene::capture(world, &other, Vec::new()).write(&kept).unwrap();
+        world.resource_mut::<WeatheringClock>().advance();
+        let refused = steps::begin_restoring(world, &kept).unwrap_err();
+        assert!(refused.contains("saved from another"), "{refused}");
+        assert!(world.resource::<WeatheringClock>().tick() == 1 && !is_busy(world));
+    }
+
+    #[test]
+    fn the_program_does_not_end_before_files_that_are_being_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let [file, scene] = ["late", "late.glb"].map(|name| folder.path().join(name));
+        let write_late = |to: &Path| {
             std::thread::sleep(std::time::Duration::from_millis(200));
-            std::fs::write(to, "whole").map_err(|source| SaveError::Write { path: "late".into(), source })
+            std::fs::write(to, "whole")
+        };
+        let pool = AsyncComputeTaskPool::get_or_init(Default::default);
+        let to = file.clone();
+        let saved = pool.spawn(async move {
+            write_late(&to).map_err(|source| SaveError::Write { path: "late".into(), source })
+        });
+        let to = scene.clone();
+        let exported = pool.spawn(async move {
+            write_late(&to).unwrap();
+            Ok(to)
         });
         let mut app = app();
-        app.insert_resource(Saving(Some(Step::Writing { folder: folder.path().into(), task })));
+        app.insert_resource(Saving(Some(Step::Writing { folder: folder.path().into(), task: saved })));
+        app.insert_resource(Exporting::writing(exported));
         // In the way of a signal or a lost device, which wait for nothing.
         app.world_mut().write_message(AppExit::error());
         app.update();
-        assert_eq!(std::fs::read_to_string(file).unwrap(), "whole");
+        for file in [file, scene] {
+            assert_eq!(std::fs::read_to_string(file).unwrap(), "whole");
+        }
     }
 }

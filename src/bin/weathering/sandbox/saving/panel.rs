@@ -8,6 +8,7 @@ use bevy_weathering::record::Recording;
 use bevy_weathering::scenario::ScenarioStatus;
 
 use super::super::export;
+use super::super::open::Opening;
 use super::super::shortcuts::Shortcuts;
 use super::super::shots::OutFolder;
 use super::super::split::Split;
@@ -52,6 +53,10 @@ pub(super) fn obstacle(world: &mut World) -> Option<&'static str> {
     if export::is_reading(world) {
         return Some("Wait until the scene is read for the export.");
     }
+    // What stands for it has nothing in it, but its name.
+    if world.resource::<Opening>().is_first() {
+        return Some("Wait until the scene is there.");
+    }
     if world.contains_resource::<Recording>() {
         return Some("End the recording first: it keeps moments of its own.");
     }
@@ -95,12 +100,31 @@ pub fn show(ui: &mut egui::Ui, world: &mut World) {
             }
         }
     }
+    let is_there = !world.resource::<Opening>().is_first();
     let is_alone = !world.contains_resource::<Split>() && !world.contains_resource::<Recording>();
-    let is_saved = is_alone && path.join("state.ron").is_file();
+    let is_saved = is_there && is_alone && path.join("state.ron").is_file();
     if is_saved
         && ui.button("Go on from there").on_hover_text("Of the same scenario only").clicked()
         && let Err(error) = begin_restoring(world, &path)
     {
         world.resource_mut::<Note>().complain(error);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::open;
+    use super::*;
+
+    #[test]
+    fn what_stands_for_the_first_scene_is_not_saved_as_it() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/scenarios/hose.ron");
+        let empty = open::without_content(&open::load(&file, None).unwrap());
+        let mut world = World::new();
+        world.init_resource::<export::Exporting>();
+        world.init_resource::<Opening>();
+        assert_eq!(obstacle(&mut world), None);
+        open::begin(&mut world, empty);
+        assert_eq!(obstacle(&mut world), Some("Wait until the scene is there."));
     }
 }

@@ -69,6 +69,9 @@ pub fn give_up_moment(world: &mut World) {
 /// What is wrong; then nothing has happened.
 pub(super) fn begin_restoring(world: &mut World, folder: &Path) -> Result<(), String> {
     let scene = Box::new(SavedScene::read(folder).map_err(|error| error.to_string())?);
+    // All scenarios have the same folder at first.
+    let loaded = &world.resource::<Opened>().loaded;
+    scene.check_scenario(loaded, folder).map_err(|error| error.to_string())?;
     if !scene.has_emitters() && added::is_any(world) {
         return Err("Remove the emitters that were added: it says nothing of emitters".into());
     }
