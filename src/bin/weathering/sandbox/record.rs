@@ -21,7 +21,7 @@ use bevy_weathering::schedule::run_tick;
 
 use super::camera::View;
 use super::hose::{self, InHand};
-use super::open::Opened;
+use super::open::{Opened, Opening};
 use super::settings::Settings;
 use super::shortcuts::Shortcuts;
 use super::shots::{OutFolder, free_name};
@@ -126,7 +126,9 @@ fn obstacle(world: &World) -> Option<&'static str> {
     if world.contains_resource::<Split>() {
         return Some("End the comparison first: the copy is no part of the scenario.");
     }
-    if !matches!(world.resource::<ScenarioStatus>(), ScenarioStatus::Ready) {
+    // What stands for the first scene has nothing in it.
+    let is_there = matches!(world.resource::<ScenarioStatus>(), ScenarioStatus::Ready);
+    if !is_there || world.resource::<Opening>().is_first() {
         return Some("Wait until the scene is there.");
     }
     if is_busy(world) {
