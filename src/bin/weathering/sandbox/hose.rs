@@ -21,7 +21,7 @@ use super::{effects, probe, shortcuts};
 const STREAM: u32 = u32::MAX;
 
 /// What it is called.
-pub const NAME: &str = "hose in the hand";
+const NAME: &str = "hose in the hand";
 
 /// The emitter in the hand. Spawned with the first press after it has gone, so that a scene without it is as it was loaded.
 #[derive(Component)]
