@@ -194,7 +194,9 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     ui.label("The line between them can be dragged.");
     let is_on = world.contains_resource::<Split>();
     if !is_on {
-        if ui.button("Begin").clicked() {
+        if world.contains_resource::<Recording>() {
+            ui.label("End the recording first: a copy is no part of it.");
+        } else if ui.button("Begin").clicked() {
             begin(world);
         }
         return;
