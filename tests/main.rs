@@ -146,6 +146,8 @@ mod window {
     mod overload;
     /// What panels look like.
     mod panels;
+    /// Recordings, and recordings of these.
+    mod record;
     /// A virtual screen, and a program on it.
     mod screen;
     /// The first picture, and files that change.

@@ -26,8 +26,7 @@ const MAX_BYTES: u64 = 1 << 30;
 /// An emitter that a session has beside those of its scenario: a hose in the hand, rain that is switched on and off.
 #[derive(Debug, Clone)]
 pub struct ExtraEmitter {
-    /// What it is. If the scenario has one of this name already, that one stays. The file of its effect is named by the
-    /// recording.
+    /// What it is. Where its name is taken, it gets a number, too. The file of its effect is named by the recording.
     pub spec: EmitterSpec,
     /// Text of an effect file that names no others.
     pub effect: String,
@@ -44,7 +43,7 @@ pub struct Beginning {
     pub surfaces: Vec<(String, PorousMaterial, StandingWater)>,
     /// Where it is seen from, in place of the scenario's camera keys.
     pub view: Option<CameraKey>,
-    /// Emitters beside the scenario's.
+    /// Emitters beside the scenario's; they come behind those, in this order.
     pub emitters: Vec<ExtraEmitter>,
 }
 
@@ -155,9 +154,8 @@ fn add_emitters(
     events: &mut Vec<EventSpec>,
 ) -> Result<(), RecordError> {
     for ExtraEmitter { mut spec, effect, is_on } in emitters {
-        if scenario.emitters.iter().any(|other| other.name == spec.name) {
-            continue;
-        }
+        // The scenario may be a recording, with tools of its own.
+        spec.name = free_name(&spec.name, |name| scenario.emitters.iter().any(|other| other.name == name));
         spec.effect = free_file(folder, &spec.name);
         write(&folder.join(&spec.effect), effect.as_bytes())?;
         (spec.start, spec.stop) = (0.0, None);
@@ -266,7 +264,18 @@ mod tests {
         // It is not written over, and what is recorded can be recorded again.
         assert!(prepare(&loaded, beginning.clone(), &folder).is_err());
         let again = prepare(&base, beginning, &to.path().join("again")).unwrap();
-        assert_eq!(again.scenario.emitters.len(), 3);
+        let names: Vec<_> = again.scenario.emitters.iter().map(|emitter| emitter.name.as_str()).collect();
+        assert_eq!(names, ["tap", "tap 2", "hose in the hand", "hose in the hand 2"]);
+        // What was done with the first hose is not done with the second.
+        let switches = |scenario: &Scenario, of: &str| {
+            let is_of_it =
+                |what: &Action| matches!(what, Action::Start(name) | Action::Stop(name) if name == of);
+            scenario.events.iter().filter(|event| is_of_it(&event.what)).cloned().collect::<Vec<_>>()
+        };
+        let first = switches(scenario, "hose in the hand");
+        assert_eq!(switches(&again.scenario, "hose in the hand"), first);
+        let stop = EventSpec { at: 0.0, what: Action::Stop("hose in the hand 2".into()) };
+        assert_eq!(switches(&again.scenario, "hose in the hand 2"), [stop]);
     }
 
     #[test]

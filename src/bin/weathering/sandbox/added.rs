@@ -18,6 +18,7 @@ use bevy_weathering::save::AddedEmitter;
 use bevy_weathering::scenario::{EmitterKey, EmitterSpec, SceneEntity};
 
 use super::camera::View;
+use super::split::Split;
 use super::ui::Note;
 use super::undo::Undo;
 use super::{effects, hose, probe};
@@ -103,13 +104,13 @@ pub fn show(ui: &mut egui::Ui, world: &mut World) {
 fn add(world: &mut World, choice: &Choice) {
     let mut views = world.query::<&View>();
     let line = views.iter(world).next().map(View::line);
-    let scene = world.resource::<CollisionScene>();
+    let (scene, split) = (world.resource::<CollisionScene>(), world.get_resource::<Split>());
     let Some(transform) = line.and_then(|(eye, target)| {
         let direction = Dir3::new(target - eye).ok()?;
         let ray = Ray3d { origin: eye, direction };
         Some(match choice.place {
             Spot::Beside => hose::aimed(ray),
-            Spot::LookedAt => before(probe::hit(scene, ray), ray, target),
+            Spot::LookedAt => before(probe::hit(scene, split, ray), ray, target),
         })
     }) else {
         return;

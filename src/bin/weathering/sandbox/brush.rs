@@ -16,6 +16,7 @@ use bevy_weathering::wetting::{KeptSurface, SurfaceWater, WetGeometry};
 use super::hose::Pointed;
 use super::probe::hit;
 use super::settings::{BrushSettings, Settings, Tool};
+use super::split::Split;
 use super::ui::{AddPanel, Place, UiInput};
 use super::undo::{Undo, redo, undo};
 use super::widgets::number;
@@ -68,6 +69,7 @@ fn paint(
     pointed: Res<Pointed>,
     settings: Res<Settings>,
     scene: Res<CollisionScene>,
+    split: Option<Res<Split>>,
     time: Res<Time<Virtual>>,
     surfaces: Query<(&SurfaceWater, &SurfaceMatter, &WetGeometry, &SurfaceCollider)>,
     mut queue: ResMut<BrushQueue>,
@@ -82,7 +84,7 @@ fn paint(
         }
         return;
     };
-    let Some(hit) = pointed.ray.and_then(|ray| hit(&scene, ray)) else { return };
+    let Some(hit) = pointed.ray.and_then(|ray| hit(&scene, split.as_deref(), ray)) else { return };
     let radius = settings.brush.radius;
     let is_due = last.0.is_none_or(|(when, place)| {
         when.elapsed().as_secs_f32() >= EVERY || place.distance(hit.point) >= SPACING * radius
@@ -114,10 +116,11 @@ fn draw(
     settings: Res<Settings>,
     input: Res<UiInput>,
     scene: Res<CollisionScene>,
+    split: Option<Res<Split>>,
     mut gizmos: Gizmos,
 ) {
     let Some(kind) = settings.tool.brush().filter(|_| !input.pointer) else { return };
-    let Some(hit) = pointed.ray.and_then(|ray| hit(&scene, ray)) else { return };
+    let Some(hit) = pointed.ray.and_then(|ray| hit(&scene, split.as_deref(), ray)) else { return };
     let color = match kind {
         BrushKind::Wet => Color::srgb(0.3, 0.6, 1.0),
         BrushKind::Dry => Color::srgb(1.0, 0.75, 0.3),

@@ -13,6 +13,7 @@ use bevy_weathering::scenario::{EmitterKey, EmitterSpec};
 use super::aim::Flight;
 use super::camera::View;
 use super::settings::{HoseSettings, Settings, Tool};
+use super::split::Split;
 use super::ui::{AddPanel, Place, UiInput};
 use super::widgets::number;
 use super::{effects, probe, shortcuts};
@@ -21,7 +22,7 @@ use super::{effects, probe, shortcuts};
 const STREAM: u32 = u32::MAX;
 
 /// What it is called.
-pub const NAME: &str = "hose in the hand";
+const NAME: &str = "hose in the hand";
 
 /// The emitter in the hand. Spawned with the first press after it has gone, so that a scene without it is as it was loaded.
 #[derive(Component)]
@@ -76,6 +77,7 @@ fn spray(
     settings: Res<Settings>,
     recording: Option<Res<Recording>>,
     scene: Res<CollisionScene>,
+    split: Option<Res<Split>>,
     known: (Res<Assets<WeatherEffect>>, Res<Forces>),
     mut commands: Commands,
     mut hoses: Query<(&mut Emitter, &mut Transform, &mut GlobalTransform), With<InHand>>,
@@ -100,7 +102,7 @@ fn spray(
     if let Some(ray) = ray {
         let (effects, forces) = known;
         let flight = Flight::new(&emitter, effects.get(&emitter.effect), &forces);
-        let aim = aimed_at(ray, &scene, flight);
+        let aim = aimed_at(ray, &scene, split.as_deref(), flight);
         *transform = aim;
         // Ticks come before transforms are propagated.
         *global = GlobalTransform::from(aim);
@@ -115,9 +117,9 @@ pub fn aimed(ray: Ray3d) -> Transform {
 }
 
 /// The same, pointing so that what flies like this comes down at what the ray hits; straight ahead where it hits nothing.
-fn aimed_at(ray: Ray3d, scene: &CollisionScene, flight: Flight) -> Transform {
+fn aimed_at(ray: Ray3d, scene: &CollisionScene, split: Option<&Split>, flight: Flight) -> Transform {
     let straight = aimed(ray);
-    match probe::hit(scene, ray) {
+    match probe::hit(scene, split, ray) {
         Some(hit) => straight.looking_to(flight.aim(straight.translation, hit.point), Vec3::Y),
         None => straight,
     }
@@ -153,7 +155,7 @@ fn take(world: &mut World, ray: Ray3d) {
     emitter.effect = effect;
     let effect = world.resource::<Assets<WeatherEffect>>().get(&emitter.effect);
     let flight = Flight::new(&emitter, effect, world.resource::<Forces>());
-    let aim = aimed_at(ray, world.resource::<CollisionScene>(), flight);
+    let aim = aimed_at(ray, world.resource::<CollisionScene>(), world.get_resource::<Split>(), flight);
     world.spawn((Name::new(NAME), InHand, emitter, aim, GlobalTransform::from(aim)));
 }
 

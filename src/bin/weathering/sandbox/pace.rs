@@ -171,25 +171,73 @@ fn show_time(ui: &mut egui::Ui, world: &mut World) {
         ShownTime::Now => now,
         ShownTime::At(seconds) => seconds,
     };
-    // So far ahead that what is wet has dried.
-    let end = (now + 600.0).max(at) * 1.2;
+    // What is shown takes its end no farther: held there it would run away. What dries later can be typed.
+    let end = ((now + 600.0) * 1.2).max(at);
     let slider = egui::Slider::new(&mut at, 0.0..=end).logarithmic(true).smallest_positive(1.0).suffix(" s");
+    let slider = slider.clamping(egui::SliderClamping::Never);
     // Decimals that are cut off would count as changes.
     ui.label("time");
     let slider = ui.add(slider.custom_formatter(|seconds, _| format!("{seconds:.1}")));
-    let slider =
-        slider.on_hover_text("The time that is shown: as it was, and as it will be if nothing happens");
-    if slider.changed() {
-        world.insert_resource(ShownTime::At(at));
+    let about = "The time that is shown: as it was, and as it will be if nothing happens; what is farther ahead \
+                 can be typed";
+    if slider.on_hover_text(about).changed() {
+        world.insert_resource(ShownTime::At(typed(at)));
     }
     if shown != ShownTime::Now && ui.button("Now").on_hover_text("Show the present").clicked() {
         world.insert_resource(ShownTime::Now);
     }
 }
 
+/// Seconds after the start: what is typed may be anything.
+fn typed(seconds: f64) -> f64 {
+    if seconds.is_finite() { seconds.max(0.0) } else { 0.0 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A frame of the slider of the shown time, with what the mouse does in it.
+    fn shown(context: &egui::Context, world: &mut World, events: Vec<egui::Event>) -> ShownTime {
+        let size = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(400.0, 300.0));
+        let input = egui::RawInput { screen_rect: Some(size), events, ..Default::default() };
+        let output = context.run_ui(input, |ui| {
+            ui.horizontal(|ui| show_time(ui, world));
+        });
+        output.drop_without_applying_deltas();
+        *world.resource::<ShownTime>()
+    }
+
+    #[test]
+    fn the_shown_time_stays_where_its_slider_is_held() {
+        let mut world = World::new();
+        world.insert_resource(WeatheringClock::new(60));
+        world.insert_resource(ShownTime::Now);
+        let context = egui::Context::default();
+        // On the slider, behind its label; and past its end.
+        let (pos, beyond) = (egui::pos2(80.0, 13.0), egui::pos2(390.0, 13.0));
+        let pressed = egui::Event::PointerButton {
+            pos,
+            button: egui::PointerButton::Primary,
+            pressed: true,
+            modifiers: egui::Modifiers::NONE,
+        };
+        shown(&context, &mut world, vec![]);
+        shown(&context, &mut world, vec![egui::Event::PointerMoved(pos)]);
+        shown(&context, &mut world, vec![pressed]);
+        let held = shown(&context, &mut world, vec![egui::Event::PointerMoved(beyond)]);
+        assert!(matches!(held, ShownTime::At(seconds) if seconds > 600.0), "{held:?}");
+        for _ in 0..10 {
+            assert_eq!(shown(&context, &mut world, vec![]), held);
+        }
+        // What is farther ahead stays, too, and is not pulled back.
+        world.insert_resource(ShownTime::At(7200.0));
+        let context = egui::Context::default();
+        for _ in 0..3 {
+            assert_eq!(shown(&context, &mut world, vec![]), ShownTime::At(7200.0));
+        }
+        assert_eq!([f64::NAN, f64::INFINITY, -3.0, 7200.0].map(typed), [0.0, 0.0, 0.0, 7200.0]);
+    }
 
     #[test]
     fn steps_of_speed_stay_in_range_and_come_back_to_the_worlds() {

@@ -13,6 +13,7 @@ use super::hose::Pointed;
 use super::selection::{Selected, name_of};
 use super::settings::{Settings, Tool};
 use super::sources;
+use super::split::Split;
 use super::ui::{AddPanel, Place};
 
 /// The farthest place that can be asked, metres.
@@ -46,22 +47,25 @@ pub fn plugin(app: &mut App) {
         .add_panel(Place::Maps, "probe", show);
 }
 
-/// What lies below the cursor.
-pub fn hit(scene: &CollisionScene, ray: Ray3d) -> Option<SceneHit> {
-    scene.cast(ray.origin, ray.origin + ray.direction * REACH)
+/// What lies below the cursor: nothing of a copy, which nobody sees there.
+pub fn hit(scene: &CollisionScene, split: Option<&Split>, ray: Ray3d) -> Option<SceneHit> {
+    let line = [ray.origin, ray.origin + ray.direction * REACH];
+    let [start, end] = split.map_or(Some(line), |split| split.without_copy(line))?;
+    scene.cast(start, end)
 }
 
 fn ask(
     pointed: Res<Pointed>,
     mut settings: ResMut<Settings>,
     scene: Res<CollisionScene>,
+    split: Option<Res<Split>>,
     mut probed: ResMut<Probed>,
     mut selected: ResMut<Selected>,
 ) {
     if settings.tool != Tool::Probe || !pointed.held {
         return;
     }
-    let Some(hit) = pointed.ray.and_then(|ray| hit(&scene, ray)) else { return };
+    let Some(hit) = pointed.ray.and_then(|ray| hit(&scene, split.as_deref(), ray)) else { return };
     selected.0 = Some(hit.surface);
     probed.0 = Some(hit);
     // What was asked for is to be seen.

@@ -38,7 +38,11 @@ const PATIENCE: Duration = Duration::from_millis(60);
 /// Seconds between two keys of the camera.
 const CAMERA_SECONDS: f64 = 0.5;
 
-type Prepared = Result<(LoadedScenario, PreparedScenario), String>;
+/// What the hose in the hand and the rain over the scene are called, if there are any. A recording of a recording has those of
+/// the first, too, as emitters like others.
+type Tools = [Option<String>; 2];
+
+type Prepared = Result<(LoadedScenario, PreparedScenario, Tools), String>;
 
 /// The base of a recording, while it is being written and read.
 #[derive(Resource, Default)]
@@ -156,42 +160,43 @@ fn begin(world: &mut World) {
         Ok(added) => added,
         Err(why) => return world.resource_mut::<Note>().complain(why),
     };
-    let hose = hose::to_record(&world.resource::<Settings>().hose);
-    beginning.emitters = hose.into_iter().chain(weather::to_record(world)).chain(added).collect();
+    let tools = [hose::to_record(&world.resource::<Settings>().hose), weather::to_record(world)];
     let loaded = world.resource::<Opened>().loaded.clone();
+    let mut behind = loaded.scenario.emitters.len()..;
+    let places = tools.each_ref().map(|tool| tool.as_ref().and_then(|_| behind.next()));
+    beginning.emitters = tools.into_iter().flatten().chain(added).collect();
     let folder: PathBuf = free_name(&world.resource::<OutFolder>().0, "recorded", "");
     let task = AsyncComputeTaskPool::get().spawn(async move {
         let base = record::prepare(&loaded, beginning, &folder).map_err(|error| error.to_string())?;
+        // Where their names were taken, they have got others.
+        let tools = places.map(|place| Some(base.scenario.emitters.get(place?)?.name.clone()));
         let prepared = PreparedScenario::new(base.clone(), true).map_err(|error| error.to_string())?;
-        Ok::<_, String>((base, prepared))
+        Ok::<_, String>((base, prepared, tools))
     });
     world.resource_mut::<Preparing>().0 = Some(task);
 }
 
 /// Shows the base and records from its first tick on.
-fn start(world: &mut World, base: LoadedScenario, prepared: PreparedScenario) {
+fn start(world: &mut World, base: LoadedScenario, prepared: PreparedScenario, tools: &Tools) {
     // They are emitters of the scenario from now on.
-    let mut tools = world.query_filtered::<Entity, Or<(With<InHand>, With<OwnRain>)>>();
-    for tool in tools.iter(world).collect::<Vec<_>>() {
+    let mut own = world.query_filtered::<Entity, Or<(With<InHand>, With<OwnRain>)>>();
+    for tool in own.iter(world).collect::<Vec<_>>() {
         world.despawn(tool);
     }
     switch_scenario(world, prepared);
     // It was about the scene that was there.
     world.resource_mut::<Undo>().clear();
     model::light_shade(world, false);
-    let mut emitters = world.query_filtered::<(Entity, &Name), With<SceneEntity>>();
-    let named: Vec<_> =
-        emitters.iter(world).map(|(entity, name)| (entity, name.as_str().to_owned())).collect();
-    for (entity, name) in named {
-        match name.as_str() {
-            hose::NAME => {
-                world.entity_mut(entity).insert(InHand);
-            }
-            weather::NAME => {
-                world.entity_mut(entity).insert(OwnRain);
-            }
-            _ => {}
-        }
+    let mut emitters = world.query_filtered::<(Entity, &Name), (With<Emitter>, With<SceneEntity>)>();
+    let [hose, rain] = tools.each_ref().map(|tool| {
+        let name = tool.as_deref()?;
+        emitters.iter(world).find(|(_, other)| other.as_str() == name).map(|(emitter, _)| emitter)
+    });
+    if let Some(hose) = hose {
+        world.entity_mut(hose).insert(InHand);
+    }
+    if let Some(rain) = rain {
+        world.entity_mut(rain).insert(OwnRain);
     }
     world.insert_resource(Opened { loaded: base.clone() });
     let told = format!("recording into {}", base.file.display());
@@ -292,10 +297,10 @@ fn advance(world: &mut World) {
     if let Some(mut task) = world.resource_mut::<Preparing>().0.take() {
         match check_ready(&mut task) {
             None => world.resource_mut::<Preparing>().0 = Some(task),
-            Some(Ok((base, prepared))) => match obstacle(world) {
+            Some(Ok((base, prepared, tools))) => match obstacle(world) {
                 // Something else was opened meanwhile.
                 Some(why) => world.resource_mut::<Note>().complain(why),
-                None => start(world, base, prepared),
+                None => start(world, base, prepared, &tools),
             },
             Some(Err(error)) => world.resource_mut::<Note>().complain(error),
         }

@@ -1,7 +1,8 @@
 //! What the sandbox remembers from one time to the next: a RON file in the user's configuration folder.
 //!
-//! A file that cannot be read is told of and left out; numbers out of range are brought back into it. It is written whole or
-//! not at all, a moment after something has changed and when the program ends.
+//! A file that cannot be read is told of and left out; numbers out of range are brought back into it, and where another version
+//! knows an effect that this one does not, the usual one takes its place. It is written whole or not at all, a moment after
+//! something has changed and when the program ends.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -190,6 +191,9 @@ impl Settings {
         hose.nozzle_mm = within(hose.nozzle_mm, nozzle, default.nozzle_mm);
         hose.spread_deg = within(hose.spread_deg, spread, default.spread_deg);
         hose.rate = within(hose.rate, rate, default.rate);
+        if super::effects::text(&hose.effect).is_none() {
+            hose.effect = default.effect;
+        }
         let (brush, default) = (&mut self.brush, BrushSettings::default());
         let [radius, strength] = BrushSettings::RANGES;
         brush.radius = within(brush.radius, radius, default.radius);
@@ -286,10 +290,11 @@ mod tests {
         };
         settings.write(&file);
         assert_eq!(Settings::read(&file), settings);
-        std::fs::write(&file, "(zoom: NaN, hose: (rate: -5.0), views: (level: 99), of_a_later_version: 3)")
-            .unwrap();
+        let nonsense =
+            r#"(zoom: NaN, hose: (effect: "slime", rate: -5.0), views: (level: 99), of_a_later_version: 3)"#;
+        std::fs::write(&file, nonsense).unwrap();
         let repaired = Settings::read(&file);
-        assert_eq!((repaired.zoom, repaired.hose.rate), (1.0, 1.0));
+        assert_eq!((repaired.zoom, repaired.hose.rate, repaired.hose.effect.as_str()), (1.0, 1.0, "hose"));
         assert_eq!(repaired.views.level, super::super::boxes::DEEPEST);
         std::fs::write(&file, "(zoom: 1.0").unwrap();
         assert_eq!(Settings::read(&file), Settings::default());

@@ -19,16 +19,30 @@ pub struct OutFolder(pub PathBuf);
 
 /// A sequence that is being taken.
 #[derive(Resource, Default)]
-struct Sequence {
+pub struct Sequence {
     folder: Option<PathBuf>,
     frames: u32,
     /// Tick of the last picture.
     tick: u32,
 }
 
-/// The next frame is to be a picture, in this file.
-#[derive(Resource, Default)]
-struct Wanted(Option<PathBuf>);
+impl Sequence {
+    /// Whether pictures without panels are being taken, one after the other.
+    pub fn fills(&self, settings: &Settings) -> bool {
+        self.folder.is_some() && !settings.panels_in_pictures
+    }
+}
+
+/// What the next frame is to be.
+#[derive(Resource, Debug, Default, Clone, PartialEq, Eq)]
+enum Wanted {
+    #[default]
+    Nothing,
+    /// A picture by itself. It gets a name when it is there, some frames later: until then others may be taken.
+    Alone,
+    /// One of a sequence, in this file.
+    Frame(PathBuf),
+}
 
 /// Takes pictures: panels go from the frame that becomes one.
 #[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
@@ -64,8 +78,7 @@ fn keys(keys: Res<Shortcuts>, mut commands: Commands) {
 }
 
 fn want_picture(world: &mut World) {
-    let path = free_name(&world.resource::<OutFolder>().0, "screenshot", ".png");
-    world.resource_mut::<Wanted>().0 = Some(path);
+    *world.resource_mut::<Wanted>() = Wanted::Alone;
 }
 
 fn toggle_sequence(world: &mut World) {
@@ -86,11 +99,10 @@ fn toggle_sequence(world: &mut World) {
 /// A picture of every frame in which time has gone on.
 fn follow_sequence(clock: Res<WeatheringClock>, mut sequence: ResMut<Sequence>, mut wanted: ResMut<Wanted>) {
     let Some(folder) = &sequence.folder else { return };
-    if clock.tick() == sequence.tick || wanted.0.is_some() {
+    if clock.tick() == sequence.tick || *wanted != Wanted::Nothing {
         return;
     }
-    let path = folder.join(format!("frame_{:05}.png", sequence.frames));
-    wanted.0 = Some(path);
+    *wanted = Wanted::Frame(folder.join(format!("frame_{:05}.png", sequence.frames)));
     sequence.frames += 1;
     sequence.tick = clock.tick();
 }
@@ -103,24 +115,28 @@ fn take(
     mut commands: Commands,
     mut panels: Query<&mut Camera, With<UiCamera>>,
 ) {
-    let path = wanted.0.take();
+    let wanted = std::mem::take(&mut *wanted);
     for mut camera in &mut panels {
-        let is_shown = path.is_none() || settings.panels_in_pictures;
+        let is_shown = wanted == Wanted::Nothing || settings.panels_in_pictures;
         if camera.is_active != is_shown {
             camera.is_active = is_shown;
         }
     }
-    let Some(path) = path else { return };
+    let frame = match wanted {
+        Wanted::Nothing => return,
+        Wanted::Alone => None,
+        Wanted::Frame(path) => Some(path),
+    };
     // Of a sequence it would be read in the pictures.
     let is_alone = sequence.folder.is_none();
     commands.spawn(Screenshot::primary_window()).observe(
-        move |captured: On<ScreenshotCaptured>, mut note: ResMut<Note>| match write_png(
-            &path,
-            captured.image.clone(),
-        ) {
-            Ok(()) if is_alone => note.tell(format!("saved {}", path.display())),
-            Ok(()) => {}
-            Err(error) => note.complain(error.to_string()),
+        move |captured: On<ScreenshotCaptured>, out: Res<OutFolder>, mut note: ResMut<Note>| {
+            let path = frame.clone().unwrap_or_else(|| free_name(&out.0, "screenshot", ".png"));
+            match write_png(&path, captured.image.clone()) {
+                Ok(()) if is_alone => note.tell(format!("saved {}", path.display())),
+                Ok(()) => {}
+                Err(error) => note.complain(error.to_string()),
+            }
         },
     );
 }
@@ -165,5 +181,40 @@ mod tests {
         std::fs::write(&first, "x").unwrap();
         assert_eq!(free_name(folder.path(), "shot", ".png"), folder.path().join("shot_001.png"));
         assert_eq!(free_name(&folder.path().join("none"), "shot", ""), folder.path().join("none/shot_000"));
+    }
+
+    #[test]
+    fn pictures_that_are_taken_before_the_first_is_written_are_files_of_their_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut world = World::new();
+        world.insert_resource(OutFolder(folder.path().into()));
+        world.init_resource::<Settings>();
+        world.init_resource::<Sequence>();
+        world.init_resource::<Wanted>();
+        world.init_resource::<Note>();
+        for _ in 0..2 {
+            want_picture(&mut world);
+            world.run_system_cached(take).unwrap();
+            assert_eq!(*world.resource::<Wanted>(), Wanted::Nothing);
+        }
+        // They come later.
+        let mut waiting = world.query_filtered::<Entity, With<Screenshot>>();
+        for entity in waiting.iter(&world).collect::<Vec<_>>() {
+            world.trigger(ScreenshotCaptured { entity, image: Image::default() });
+        }
+        let written = ["screenshot_000.png", "screenshot_001.png"].map(|name| folder.path().join(name));
+        assert!(written.iter().all(|path| path.is_file()));
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+    }
+
+    #[test]
+    fn a_sequence_without_panels_fills_the_window_until_it_ends() {
+        let mut sequence = Sequence::default();
+        let mut settings = Settings::default();
+        assert!(!sequence.fills(&settings));
+        sequence.folder = Some("pictures".into());
+        assert!(sequence.fills(&settings));
+        settings.panels_in_pictures = true;
+        assert!(!sequence.fills(&settings));
     }
 }

@@ -40,6 +40,22 @@ pub struct Split {
     pub at: f32,
 }
 
+impl Split {
+    /// The part of a line, from start to end, that may hit the scene, and not its copy.
+    pub fn without_copy(&self, [start, end]: [Vec3; 2]) -> Option<[Vec3; 2]> {
+        let (low, high) = self.bounds;
+        // Half way between the two.
+        let border = 0.5 * (low.x + high.x + self.offset.x);
+        let crossing = start.lerp(end, (border - start.x) / (end.x - start.x));
+        match [start, end].map(|place| place.x <= border) {
+            [true, true] => Some([start, end]),
+            [true, false] => Some([start, crossing]),
+            [false, true] => Some([crossing, end]),
+            [false, false] => None,
+        }
+    }
+}
+
 /// What stands for another entity in the copy.
 #[derive(Component)]
 pub struct CopyOf(Entity);
@@ -178,7 +194,9 @@ fn show(ui: &mut egui::Ui, world: &mut World) {
     ui.label("The line between them can be dragged.");
     let is_on = world.contains_resource::<Split>();
     if !is_on {
-        if ui.button("Begin").clicked() {
+        if world.contains_resource::<Recording>() {
+            ui.label("End the recording first: a copy is no part of it.");
+        } else if ui.button("Begin").clicked() {
             begin(world);
         }
         return;
@@ -213,12 +231,50 @@ pub fn show_divider(context: &egui::Context, free: egui::Rect, world: &mut World
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use bevy::math::Affine3A;
+    use bevy_weathering::collision::{MeshBvh, MeshTriangles};
+
+    use super::super::probe;
     use super::*;
 
     #[test]
     fn the_copy_is_out_of_the_way() {
         for bounds in [(Vec3::ZERO, Vec3::ONE), (Vec3::splat(-40.0), Vec3::splat(60.0))] {
             assert!(offset(bounds).x > bounds.1.x - bounds.0.x);
+        }
+    }
+
+    #[test]
+    fn tools_act_on_the_scene_and_not_on_its_copy() {
+        let mesh = Mesh::from(Cuboid::new(2.0, 2.0, 2.0));
+        let cube = Arc::new(MeshBvh::build(MeshTriangles::from_mesh(&mesh).unwrap()));
+        let bounds = (Vec3::NEG_ONE, Vec3::ONE);
+        let offset = offset(bounds);
+        let [original, copy] = [1, 2].map(|number| Entity::from_raw_u32(number).unwrap());
+        let scene = CollisionScene::new([
+            (original, Affine3A::IDENTITY, cube.clone()),
+            (copy, Affine3A::from_translation(offset), cube),
+        ]);
+        let split = Split { offset, bounds, at: 0.5 };
+        let found = |split: Option<&Split>, origin: Vec3, direction: Dir3| {
+            probe::hit(&scene, split, Ray3d { origin, direction }).map(|hit| hit.surface)
+        };
+        let (above, beyond) = (Vec3::new(-3.0, 2.0, 0.0), offset * 2.0);
+        for (origin, direction, alone, compared) in [
+            // From before the scene, and past it.
+            (Vec3::X * -3.0, Dir3::X, Some(original), Some(original)),
+            (above, Dir3::new(offset - above).unwrap(), Some(copy), None),
+            // From between the two, and from beyond the copy.
+            (offset * 0.5 - Vec3::X, Dir3::X, Some(copy), None),
+            (beyond, Dir3::NEG_X, Some(copy), Some(original)),
+            (beyond, Dir3::X, None, None),
+        ] {
+            // Not where two triangles meet.
+            let origin = origin.with_z(0.3);
+            let surfaces = [None, Some(&split)].map(|split| found(split, origin, direction));
+            assert_eq!(surfaces, [alone, compared], "from {origin} along {direction:?}");
         }
     }
 }

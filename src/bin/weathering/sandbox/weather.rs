@@ -21,7 +21,7 @@ use super::widgets::number;
 pub struct OwnRain;
 
 /// What it is called.
-pub const NAME: &str = "rain over the scene";
+const NAME: &str = "rain over the scene";
 
 /// Number of its random stream.
 const STREAM: u32 = u32::MAX - 1;
