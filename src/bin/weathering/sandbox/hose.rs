@@ -13,8 +13,9 @@ use bevy_weathering::scenario::{EmitterKey, EmitterSpec};
 use super::aim::Flight;
 use super::camera::View;
 use super::settings::{HoseSettings, Settings, Tool};
+use super::shots::Sequence;
 use super::split::Split;
-use super::ui::{AddPanel, Place, UiInput};
+use super::ui::{AddPanel, Place, UiCamera, UiInput};
 use super::widgets::number;
 use super::{effects, probe, shortcuts};
 
@@ -53,13 +54,18 @@ fn point(
     input: Res<UiInput>,
     window: Query<&Window, With<PrimaryWindow>>,
     cameras: Query<(&Camera, &GlobalTransform), With<View>>,
+    panels: Query<&Camera, (With<UiCamera>, Without<View>)>,
+    (sequence, settings): (Res<Sequence>, Res<Settings>),
     mut pointed: ResMut<Pointed>,
 ) {
-    let window = window.single().ok();
     pointed.pressed = buttons.just_pressed(MouseButton::Left) && !input.took_press;
     // A click within one slow frame is seen pressed and let go of, and counts for that frame.
     pointed.held = pointed.pressed || (pointed.held && buttons.pressed(MouseButton::Left));
-    let cursor = window.and_then(Window::cursor_position);
+    // A picture without panels was drawn in other parts than the window is: what is pointed at is where it was before.
+    if panels.iter().any(|camera| !camera.is_active) && !sequence.fills(&settings) {
+        return;
+    }
+    let cursor = window.single().ok().and_then(Window::cursor_position);
     pointed.ray = cursor.zip(cameras.iter().next()).and_then(|(cursor, (camera, transform))| {
         // The part of the window that is another camera's is not pointed at.
         if !camera.logical_viewport_rect().is_some_and(|rect| rect.contains(cursor)) {

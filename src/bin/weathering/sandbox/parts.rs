@@ -1,31 +1,35 @@
 //! The parts of the window that cameras draw: what panels leave of it, so that what is looked at is in the middle of that; in a
-//! comparison the two sides of the divider. In pictures without panels, all of it.
+//! comparison the two sides of the divider. In pictures without panels, all of it; also between those of a sequence, or the scene
+//! would jump.
 
 use bevy::camera::{CameraUpdateSystems, Viewport};
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 
 use super::camera::View;
-use super::shots;
+use super::settings::Settings;
+use super::shots::{Sequence, TakeSystems};
 use super::split::{SecondCamera, Split};
 use super::ui::{UiCamera, UiInput};
 
 pub fn plugin(app: &mut App) {
     // Pictures may have other parts than the window has, and a camera draws what fits its part.
-    app.add_systems(PostUpdate, share_out.after(shots::TakeSystems).before(CameraUpdateSystems));
+    app.add_systems(PostUpdate, share_out.after(TakeSystems).before(CameraUpdateSystems));
 }
 
 /// Gives each camera its part.
 fn share_out(
     split: Option<Res<Split>>,
     input: Res<UiInput>,
+    (sequence, settings): (Res<Sequence>, Res<Settings>),
     panels: Query<&Camera, (With<UiCamera>, Without<View>, Without<SecondCamera>)>,
     window: Query<&Window, With<PrimaryWindow>>,
     mut first: Query<&mut Camera, (With<View>, Without<SecondCamera>)>,
     mut second: Query<&mut Camera, With<SecondCamera>>,
 ) {
     let Ok(window) = window.single() else { return };
-    let free = input.free.filter(|_| panels.iter().any(|camera| camera.is_active));
+    let has_panels = !sequence.fills(&settings) && panels.iter().any(|camera| camera.is_active);
+    let free = input.free.filter(|_| has_panels);
     let all = area(window.physical_size(), free);
     let [left, right] = split.map_or([all; 2], |split| halves(all, split.at));
     for mut camera in &mut first {
@@ -97,12 +101,15 @@ mod tests {
     fn a_scene_alone_has_all_that_panels_leave_and_pictures_without_them_the_window() {
         let mut world = World::new();
         world.insert_resource(UiInput { free: Some(FREE), ..default() });
+        world.init_resource::<Sequence>();
+        world.init_resource::<Settings>();
         let mut window = Window::default();
         window.resolution.set_physical_resolution(1280, 720);
         world.spawn((window, PrimaryWindow));
         let panels = world.spawn((UiCamera, Camera::default())).id();
         let camera = world.spawn((View::new(Vec3::ONE, Vec3::ZERO), Camera::default())).id();
-        let mut part = |shows_panels: bool| {
+        let mut part = |shows_panels: bool, sequence: Sequence| {
+            world.insert_resource(sequence);
             world.get_mut::<Camera>(panels).unwrap().is_active = shows_panels;
             world.run_system_cached(share_out).unwrap();
             let viewport = world.get::<Camera>(camera).unwrap().viewport.clone().unwrap();
@@ -111,7 +118,8 @@ mod tests {
                 viewport.physical_position + viewport.physical_size,
             )
         };
-        assert_eq!(part(true), FREE.as_urect());
-        assert_eq!(part(false), URect::new(0, 0, 1280, 720));
+        let whole = URect::new(0, 0, 1280, 720);
+        assert_eq!([true, false].map(|shown| part(shown, default())), [FREE.as_urect(), whole]);
+        assert_eq!([true, false].map(|shown| part(shown, Sequence::into_folder("pictures"))), [whole; 2]);
     }
 }

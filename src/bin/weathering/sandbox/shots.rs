@@ -27,6 +27,12 @@ pub struct Sequence {
 }
 
 impl Sequence {
+    /// One that is being taken.
+    #[cfg(test)]
+    pub fn into_folder(folder: &str) -> Self {
+        Self { folder: Some(folder.into()), ..default() }
+    }
+
     /// Whether pictures without panels are being taken, one after the other.
     pub fn fills(&self, settings: &Settings) -> bool {
         self.folder.is_some() && !settings.panels_in_pictures
@@ -212,7 +218,7 @@ mod tests {
         let mut sequence = Sequence::default();
         let mut settings = Settings::default();
         assert!(!sequence.fills(&settings));
-        sequence.folder = Some("pictures".into());
+        sequence = Sequence::into_folder("pictures");
         assert!(sequence.fills(&settings));
         settings.panels_in_pictures = true;
         assert!(!sequence.fills(&settings));
