@@ -13,7 +13,7 @@ const SNOW: [u32; 2] = [758, 250];
 
 /// What a click with the probe finds in the middle of the floor, where the jet comes down.
 fn probe(sandbox: &mut Sandbox) -> String {
-    sandbox.answer("probe: ", |sandbox| sandbox.click(MIDDLE))
+    sandbox.answer("probe: surface ", |sandbox| sandbox.click(MIDDLE))
 }
 
 /// A number of what was found.

@@ -94,7 +94,8 @@ fn exit_after_input() {
     std::process::exit(3);
 }
 
-#[cfg(all(test, unix))]
+#[cfg(unix)]
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -258,6 +258,8 @@ mod tests {
         world.init_resource::<Pointed>();
         world.init_resource::<UiInput>();
         world.init_resource::<ButtonInput<MouseButton>>();
+        world.init_resource::<Sequence>();
+        world.init_resource::<Settings>();
         let mut schedule = Schedule::default();
         schedule.add_systems(point);
         // Of a frame: whether the pointer is over a panel, and what the button does.
