@@ -257,33 +257,19 @@ pub(crate) fn put_matter(world: &mut World, surface: Entity, material: PorousMat
     }
 }
 
+/// Water, and what it needs: both go with the maps.
+type OnMaps = (WetGeometry, Measured, PosedSlopes, SurfaceWater, Exposure, FormerMaterial);
+
 /// A surface without maps has no water any more. What is queued for it, and what is falling off it, stays.
 pub(super) fn release_maps(removed: On<Remove, MapSize>, mut commands: Commands) {
-    commands.entity(removed.entity).try_remove::<(
-        WetGeometry,
-        Measured,
-        PosedSlopes,
-        SurfaceWater,
-        Exposure,
-        FormerMaterial,
-    )>();
+    commands.entity(removed.entity).try_remove::<OnMaps>();
 }
 
 /// A surface that is not [`Weatherable`] any more is not wet any more.
 pub(super) fn release_surface(removed: On<Remove, Weatherable>, mut commands: Commands) {
-    commands.entity(removed.entity).try_remove::<(
-        WetGeometry,
-        Measured,
-        PosedSlopes,
-        SurfaceWater,
-        Exposure,
-        FormerMaterial,
-        DropQueue,
-        Dripping,
-        SurfaceMatter,
-        MatterQueue,
-        FallingSnow,
-    )>();
+    commands
+        .entity(removed.entity)
+        .try_remove::<(OnMaps, DropQueue, Dripping, SurfaceMatter, MatterQueue, FallingSnow)>();
 }
 
 #[cfg(test)]
